@@ -1,0 +1,1 @@
+"""The `wind` command: one module for each subcommand."""

@@ -1,0 +1,1 @@
+"""Recorded minus simulated: the physics that was left out."""

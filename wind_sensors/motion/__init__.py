@@ -1,0 +1,1 @@
+"""Frames, platform velocity, lever arm."""

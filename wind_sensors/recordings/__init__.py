@@ -1,0 +1,1 @@
+"""Bags, tables and logs: the only room that opens files."""

@@ -1,0 +1,1 @@
+"""Wind to signals."""

@@ -1,0 +1,1 @@
+"""What is mounted, where, with which constants; the signals it delivers."""

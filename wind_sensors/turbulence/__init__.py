@@ -1,0 +1,1 @@
+"""Spectra, structure functions, the surface layer, and synthetic turbulence."""
