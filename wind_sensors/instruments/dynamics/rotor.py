@@ -1,0 +1,312 @@
+"""Equation of motion of any rotor of the family: cups and propellers, with what can go wrong.
+
+With y = l s [m/s] (calibration distance times rotor rate) one first-order equation holds for all
+members (Kristensen (1994), (1), (2), (30); Kristensen et al. (2014), (58), (83); Jackson, (5))::
+
+    l0 I dy/dt = rho { (A - y) [a4 B + (1 - a4) y] + e A^2 cos(psi - alpha - psi_e) + E } - F sgn(y)
+
+A is the effective axial forcing, B the wind that sets the torque's slope (B = A for cups,
+B = U g(theta)/g(0) for a propeller), rho the air density relative to the calibration's, I the
+inertia relative to the healthy rotor's, e the once-per-revolution torque of an unequal rotor,
+E the second-order lift of the Kristensen (1994) forms, and F = U_s^2 the bearing friction.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+
+FloatArray = npt.NDArray[np.float64]
+
+CUP_EQUIVALENT = 0
+"""Cup with the equivalent forcing of Kristensen et al. (2014), (83)."""
+CUP_KRISTENSEN_1994 = 1
+"""Cup with the second-order lift of Kristensen (1994), (2)."""
+PROPELLER_JACKSON = 2
+"""Propeller with angular response f(theta) and g(theta), Jackson (5)."""
+PROPELLER_KRISTENSEN_1994 = 3
+"""Propeller of Kristensen (1994), (30)."""
+
+RESPONSE_TABLE_SIZE = 181
+"""Angular response tables hold f(theta) at 0, 1, ..., 180 degrees."""
+
+
+class RotorParameters(NamedTuple):
+    """Constants of one rotor, healthy values first, then what can go wrong.
+
+    Lengths in m, speeds in m/s, angles in rad, temperatures in K or deg C (differences only).
+    """
+
+    form: int
+    calibration_distance: float
+    """Wind run per radian l [m/rad]."""
+    starting_speed: float
+    """Calibration offset U0 [m/s]: l S = U - U0."""
+    distance_constant: float
+    """Distance constant l0 [m] at the calibration's air density."""
+    a4: float
+    """Share of the torque slope that follows the wind instead of the rotor, l/(l + Lambda)."""
+    mu1: float
+    mu2: float
+    angular_response: FloatArray
+    """f(theta) of a propeller at 0..180 degrees; shape (181,); ignored by cups."""
+    calibration_gain: float
+    """Steady rate relative to the calibration (1 = healthy)."""
+    calibration_offset: float
+    """Added to the steady reading [m/s] (0 = healthy)."""
+    friction: float
+    """Bearing friction U_s^2 [m^2/s^2] at the reference temperature."""
+    friction_temperature_coefficient: float
+    """Relative change of the friction per kelvin [1/K]."""
+    reference_temperature: float
+    """Temperature at which `friction` holds [deg C]."""
+    inertia_factor: float
+    """Moment of inertia relative to the healthy rotor's."""
+    torque_harmonic: float
+    """Once-per-revolution torque e relative to the dynamic pressure (0 = healthy)."""
+    torque_harmonic_phase: float
+    """Rotor angle of the strong side [rad]."""
+
+
+@compiled
+def table_at(table: FloatArray, angle: float) -> float:
+    """Angular response at an angle [rad, 0..pi] by linear interpolation of a 1-degree table."""
+    position = angle * (180.0 / math.pi)
+    index = int(position)
+    if index < 0:
+        return float(table[0])
+    if index >= RESPONSE_TABLE_SIZE - 1:
+        return float(table[RESPONSE_TABLE_SIZE - 1])
+    fraction = position - index
+    return float(table[index] * (1.0 - fraction) + table[index + 1] * fraction)
+
+
+@compiled
+def torque_slope_ratio(angle: float) -> float:
+    """g(theta)/g(0) = sqrt(cos(0.98 theta)), mirrored behind the rotor plane (Jackson, sec. 3.3).
+
+    Clipped at its value for 90 degrees, so that a rotor in cross wind still feels the air.
+    """
+    folded = min(angle, math.pi - angle)
+    return math.sqrt(max(math.cos(0.98 * folded), 0.0))
+
+
+@compiled
+def rotor_forcing(
+    p: RotorParameters, axial: float, transverse: float, lateral_angle: float
+) -> tuple[float, float, float]:
+    """Effective forcing A, slope wind B [m/s] and lift E [m^2/s^2] of a wind in rotor axes.
+
+    Args:
+        p: Constants of the rotor.
+        axial: For a cup the wind along its axis (w, upwards); for a propeller the axial wind that
+            drives it forward [m/s].
+        transverse: For a cup the speed in the plane of rotation h; for a propeller the speed
+            across its axis [m/s].
+        lateral_angle: Direction of the transverse wind in the plane of rotation [rad]; only the
+            once-per-revolution torque uses it.
+
+    Returns:
+        A, B [m/s] and E [m^2/s^2].
+    """
+    if p.form == CUP_EQUIVALENT:
+        h = transverse
+        forcing = h + p.mu1 * axial + p.mu2 * (math.sqrt(h * h + axial * axial) - h)
+        lift = 0.0
+        slope_is_forcing = True
+        slope = 0.0
+    elif p.form == CUP_KRISTENSEN_1994:
+        forcing = transverse + p.mu1 * axial
+        lift = 0.5 * p.mu2 * axial * axial
+        slope_is_forcing = True
+        slope = 0.0
+    elif p.form == PROPELLER_KRISTENSEN_1994:
+        forcing = axial
+        lift = 0.5 * p.mu2 * transverse * transverse
+        slope_is_forcing = True
+        slope = 0.0
+    else:
+        speed = math.sqrt(axial * axial + transverse * transverse)
+        angle = math.atan2(transverse, axial)
+        forcing = speed * table_at(p.angular_response, angle)
+        lift = 0.0
+        slope_is_forcing = False
+        slope = speed * torque_slope_ratio(angle)
+    forcing = p.calibration_gain * forcing
+    if forcing >= 0.0:
+        forcing = forcing - p.starting_speed + p.calibration_offset
+        if p.form != PROPELLER_JACKSON and forcing < 0.0:
+            forcing = 0.0
+    else:
+        forcing = forcing + p.starting_speed + p.calibration_offset
+    return forcing, (forcing if slope_is_forcing else slope), lift
+
+
+@compiled
+def rotor_acceleration(
+    p: RotorParameters,
+    y: float,
+    psi: float,
+    forcing: float,
+    slope: float,
+    lift: float,
+    lateral_angle: float,
+    density_ratio: float,
+    temperature: float,
+) -> float:
+    """dy/dt [m/s^2] of the rotor equation; see the module's text for the terms.
+
+    A rotor at rest stays at rest while the aerodynamic torque does not exceed the friction.
+    """
+    torque = (forcing - y) * (p.a4 * slope + (1.0 - p.a4) * y) + lift
+    if p.torque_harmonic != 0.0:
+        torque += (
+            p.torque_harmonic
+            * forcing
+            * forcing
+            * math.cos(psi - lateral_angle - p.torque_harmonic_phase)
+        )
+    torque *= density_ratio
+    friction = p.friction * (
+        1.0 + p.friction_temperature_coefficient * (temperature - p.reference_temperature)
+    )
+    friction = max(friction, 0.0)
+    if y > 0.0:
+        torque -= friction
+    elif y < 0.0:
+        torque += friction
+    elif abs(torque) <= friction:
+        torque = 0.0
+    else:
+        torque -= math.copysign(friction, torque)
+    return torque / (p.distance_constant * p.inertia_factor)
+
+
+@compiled
+def advance_rotor(
+    p: RotorParameters,
+    y: float,
+    psi: float,
+    axial: tuple[float, float],
+    transverse: tuple[float, float],
+    lateral: tuple[float, float],
+    density_ratio: float,
+    temperature: float,
+    dt: float,
+) -> tuple[float, float]:
+    """One interval of the rotor equation, the wind varying linearly over it.
+
+    Fourth-order Runge-Kutta with as many substeps as the response length asks for. The rotor
+    stops when friction brings it to rest inside a substep.
+
+    Args:
+        p: Constants of the rotor.
+        y: l s at the start [m/s].
+        psi: Rotor angle at the start [rad].
+        axial, transverse, lateral: Wind in rotor axes (see `rotor_forcing`) at start and end.
+        density_ratio: Air density relative to the calibration's.
+        temperature: Air temperature [deg C].
+        dt: Interval [s].
+
+    Returns:
+        y [m/s] and psi [rad] at the end.
+    """
+    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0], lateral[0])
+    a_1, b_1, e_1 = rotor_forcing(p, axial[1], transverse[1], lateral[1])
+    fastest = density_ratio * max(abs(b_0), abs(b_1), abs(a_0), abs(a_1), abs(y))
+    substeps = 1 + int(2.5 * dt * fastest / (p.distance_constant * p.inertia_factor))
+    if p.torque_harmonic != 0.0:
+        substeps = max(substeps, 1 + int(1.5 * dt * abs(y) / p.calibration_distance))
+    step = dt / substeps
+    turn = lateral[1] - lateral[0]
+    turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+    inverse_length = 1.0 / p.calibration_distance
+    for k in range(substeps):
+        f_0 = k / substeps
+        f_h = (k + 0.5) / substeps
+        f_1 = (k + 1.0) / substeps
+        l_0 = lateral[0] + f_0 * turn
+        l_h = lateral[0] + f_h * turn
+        l_1 = lateral[0] + f_1 * turn
+        a_h = a_0 + f_h * (a_1 - a_0)
+        b_h = b_0 + f_h * (b_1 - b_0)
+        e_h = e_0 + f_h * (e_1 - e_0)
+        k_1 = rotor_acceleration(
+            p, y, psi, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0),
+            e_0 + f_0 * (e_1 - e_0), l_0, density_ratio, temperature,
+        )  # fmt: skip
+        y_2 = y + 0.5 * step * k_1
+        psi_2 = psi + 0.5 * step * y * inverse_length
+        k_2 = rotor_acceleration(p, y_2, psi_2, a_h, b_h, e_h, l_h, density_ratio, temperature)
+        y_3 = y + 0.5 * step * k_2
+        psi_3 = psi + 0.5 * step * y_2 * inverse_length
+        k_3 = rotor_acceleration(p, y_3, psi_3, a_h, b_h, e_h, l_h, density_ratio, temperature)
+        y_4 = y + step * k_3
+        psi_4 = psi + step * y_3 * inverse_length
+        k_4 = rotor_acceleration(
+            p, y_4, psi_4, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
+            e_0 + f_1 * (e_1 - e_0), l_1, density_ratio, temperature,
+        )  # fmt: skip
+        y_next = y + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+        psi += step / 6.0 * (y + 2.0 * y_2 + 2.0 * y_3 + y_4) * inverse_length
+        if p.friction > 0.0 and y != 0.0 and y_next * y < 0.0:
+            y_next = 0.0
+        if p.form != PROPELLER_JACKSON and y_next < 0.0:
+            y_next = 0.0
+        y = y_next
+    return y, psi
+
+
+@compiled
+def integrate_cup(
+    p: RotorParameters,
+    wind: FloatArray,
+    density_ratio: FloatArray,
+    temperature: FloatArray,
+    dt: float,
+    y_start: float,
+    psi_start: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Rotor rate and angle of a cup in a sampled wind.
+
+    Args:
+        p: Constants of the rotor.
+        wind: Wind in rotor axes (x, y in the plane of rotation, z along the axis) [m/s], shape
+            (n, 3), linear between the samples.
+        density_ratio: Air density relative to the calibration's, shape (n,).
+        temperature: Air temperature [deg C], shape (n,).
+        dt: Sampling interval [s].
+        y_start: l s at the first sample [m/s]; negative means "in equilibrium with the wind".
+        psi_start: Rotor angle at the first sample [rad].
+
+    Returns:
+        y = l s [m/s] and psi [rad] at the samples, shape (n,) each.
+    """
+    n = wind.shape[0]
+    y_out = np.empty(n)
+    psi_out = np.empty(n)
+    h = math.hypot(wind[0, 0], wind[0, 1])
+    lateral = math.atan2(wind[0, 1], wind[0, 0])
+    y = y_start
+    if y < 0.0:
+        y = max(rotor_forcing(p, wind[0, 2], h, lateral)[0], 0.0)
+    psi = psi_start
+    y_out[0] = y
+    psi_out[0] = psi
+    for i in range(1, n):
+        h_next = math.hypot(wind[i, 0], wind[i, 1])
+        lateral_next = math.atan2(wind[i, 1], wind[i, 0])
+        y, psi = advance_rotor(
+            p, y, psi, (wind[i - 1, 2], wind[i, 2]), (h, h_next), (lateral, lateral_next),
+            density_ratio[i], temperature[i], dt,
+        )  # fmt: skip
+        h = h_next
+        lateral = lateral_next
+        y_out[i] = y
+        psi_out[i] = psi
+    return y_out, psi_out

@@ -1,0 +1,272 @@
+"""Equation of motion of a vane in a wind that turns, on a mount that may turn and tilt.
+
+With phi the heading of the nose in the sensor frame, alpha the heading the wind comes from, h the
+speed across the vane's axis and Omega the yaw rate of the mount::
+
+    phi'' = -2 zeta (h/l_v) (phi' + Omega) - (h/l_v)^2 sin(phi - alpha) - Omega'
+            + (-b g_x sin phi + b g_y cos phi) - (h_f/l_v)^2 sgn(phi')
+
+(Kristensen (1994), (36) to (43), with sin for large deviations). Damping acts on the turning
+against the air, friction on the turning against the mount.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+from wind_sensors.instruments.dynamics.rotor import RotorParameters, advance_rotor, rotor_forcing
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class VaneParameters(NamedTuple):
+    """Constants of one vane, healthy values first, then what can go wrong. SI units, rad."""
+
+    distance_constant: float
+    """l_v = U / omega_0 [m] at the calibration's air density."""
+    damping_ratio: float
+    """zeta."""
+    inertia_factor: float
+    """Moment of inertia relative to the healthy vane's."""
+    damping_factor: float
+    """Damping relative to the healthy vane's."""
+    friction: float
+    """h_f^2 [m^2/s^2]: the vane sticks while h^2 |sin(phi - alpha)| stays below it."""
+    imbalance: float
+    """b = m r / I [1/m]: angular acceleration per acceleration across the nose."""
+    aerodynamic_offset: float
+    """Angle at which the fin balances, relative to the wind [rad] (a bent fin)."""
+
+
+@compiled
+def vane_acceleration(
+    p: VaneParameters,
+    phi: float,
+    phi_rate: float,
+    alpha: float,
+    h: float,
+    yaw_rate: float,
+    yaw_acceleration: float,
+    gravity_x: float,
+    gravity_y: float,
+    density_ratio: float,
+) -> float:
+    """phi'' [rad/s^2] without friction; see the module's text for the terms."""
+    omega = h / p.distance_constant
+    stiffness = density_ratio / p.inertia_factor
+    restoring = stiffness * omega * omega * math.sin(phi - alpha - p.aerodynamic_offset)
+    damping = 2.0 * p.damping_ratio * p.damping_factor * stiffness * omega * (phi_rate + yaw_rate)
+    gravity = (
+        p.imbalance / p.inertia_factor * (-gravity_x * math.sin(phi) + gravity_y * math.cos(phi))
+    )
+    return -damping - restoring - yaw_acceleration + gravity
+
+
+@compiled
+def advance_vane(
+    p: VaneParameters,
+    phi: float,
+    phi_rate: float,
+    wind_x: tuple[float, float],
+    wind_y: tuple[float, float],
+    yaw_rate: tuple[float, float],
+    gravity: tuple[float, float],
+    density_ratio: float,
+    dt: float,
+) -> tuple[float, float]:
+    """One interval of the vane equation, the wind varying linearly over it.
+
+    Args:
+        p: Constants of the vane.
+        phi, phi_rate: Heading of the nose [rad] and its rate [rad/s] against the mount.
+        wind_x, wind_y: Wind in the sensor frame at start and end [m/s].
+        yaw_rate: Yaw rate of the mount at start and end [rad/s].
+        gravity: Gravity minus the mount's acceleration along the sensor's x and y [m/s^2].
+        density_ratio: Air density relative to the calibration's.
+        dt: Interval [s].
+
+    Returns:
+        phi [rad] and its rate [rad/s] at the end.
+    """
+    h_largest = max(math.hypot(wind_x[0], wind_y[0]), math.hypot(wind_x[1], wind_y[1]))
+    stiffness = density_ratio / p.inertia_factor
+    omega = h_largest / p.distance_constant * math.sqrt(stiffness)
+    rate = omega * max(1.0, 2.0 * p.damping_ratio * p.damping_factor * math.sqrt(stiffness))
+    substeps = 1 + int(2.0 * dt * rate)
+    if p.friction > 0.0:
+        substeps = max(substeps, 4)
+    step = dt / substeps
+    yaw_acceleration = (yaw_rate[1] - yaw_rate[0]) / dt
+    friction = p.friction / (p.distance_constant * p.distance_constant * p.inertia_factor)
+    for k in range(substeps):
+        f_h = (k + 0.5) / substeps
+        x_h = wind_x[0] + f_h * (wind_x[1] - wind_x[0])
+        y_h = wind_y[0] + f_h * (wind_y[1] - wind_y[0])
+        h = math.hypot(x_h, y_h)
+        alpha = math.atan2(-y_h, -x_h)
+        turn = yaw_rate[0] + f_h * (yaw_rate[1] - yaw_rate[0])
+        # Between the substep's ends the wind is held at its middle: second order in the step, and
+        # one evaluation of the wind's direction for the four stages.
+        drag = 0.0
+        drive = vane_acceleration(
+            p, phi, phi_rate, alpha, h, turn, yaw_acceleration, gravity[0], gravity[1],
+            density_ratio,
+        )  # fmt: skip
+        if friction > 0.0:
+            if phi_rate == 0.0:
+                if abs(drive) <= friction:
+                    continue
+                drag = -math.copysign(friction, drive)
+            else:
+                drag = -math.copysign(friction, phi_rate)
+        k_1 = drive + drag
+        v_2 = phi_rate + 0.5 * step * k_1
+        k_2 = drag + vane_acceleration(
+            p, phi + 0.5 * step * phi_rate, v_2, alpha, h, turn, yaw_acceleration,
+            gravity[0], gravity[1], density_ratio,
+        )  # fmt: skip
+        v_3 = phi_rate + 0.5 * step * k_2
+        k_3 = drag + vane_acceleration(
+            p, phi + 0.5 * step * v_2, v_3, alpha, h, turn, yaw_acceleration,
+            gravity[0], gravity[1], density_ratio,
+        )  # fmt: skip
+        v_4 = phi_rate + step * k_3
+        k_4 = drag + vane_acceleration(
+            p, phi + step * v_3, v_4, alpha, h, turn, yaw_acceleration,
+            gravity[0], gravity[1], density_ratio,
+        )  # fmt: skip
+        phi += step / 6.0 * (phi_rate + 2.0 * v_2 + 2.0 * v_3 + v_4)
+        rate_next = phi_rate + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+        if friction > 0.0 and rate_next * phi_rate < 0.0:
+            rate_next = 0.0
+        phi_rate = rate_next
+    return phi, phi_rate
+
+
+@compiled
+def integrate_vane(
+    p: VaneParameters,
+    wind: FloatArray,
+    yaw_rate: FloatArray,
+    gravity: FloatArray,
+    density_ratio: FloatArray,
+    dt: float,
+    phi_start: float,
+    phi_rate_start: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Heading of a vane's nose in a sampled wind.
+
+    Args:
+        p: Constants of the vane.
+        wind: Wind in the sensor frame [m/s], shape (n, 3), linear between the samples.
+        yaw_rate: Yaw rate of the mount [rad/s], shape (n,).
+        gravity: Gravity minus the mount's acceleration along x and y [m/s^2], shape (n, 2).
+        density_ratio: Air density relative to the calibration's, shape (n,).
+        dt: Sampling interval [s].
+        phi_start: Heading at the first sample [rad]; NaN means "into the wind".
+        phi_rate_start: Its rate [rad/s].
+
+    Returns:
+        phi [rad], continuous (not wrapped), and its rate [rad/s], shape (n,) each.
+    """
+    n = wind.shape[0]
+    phi_out = np.empty(n)
+    rate_out = np.empty(n)
+    phi = phi_start
+    if math.isnan(phi):
+        phi = math.atan2(-wind[0, 1], -wind[0, 0]) + p.aerodynamic_offset
+    rate = phi_rate_start
+    phi_out[0] = phi
+    rate_out[0] = rate
+    for i in range(1, n):
+        phi, rate = advance_vane(
+            p, phi, rate, (wind[i - 1, 0], wind[i, 0]), (wind[i - 1, 1], wind[i, 1]),
+            (yaw_rate[i - 1], yaw_rate[i]), (gravity[i, 0], gravity[i, 1]), density_ratio[i], dt,
+        )  # fmt: skip
+        phi_out[i] = phi
+        rate_out[i] = rate
+    return phi_out, rate_out
+
+
+@compiled
+def propeller_axes(
+    wind_x: float, wind_y: float, wind_z: float, phi: float, air_turn: float, arm: float
+) -> tuple[float, float, float]:
+    """Axial and transverse wind of a propeller on a vane, and the transverse wind's direction.
+
+    Args:
+        wind_x, wind_y, wind_z: Wind in the sensor frame [m/s].
+        phi: Heading of the nose [rad].
+        air_turn: Turning rate of the vane against the air [rad/s].
+        arm: Distance of the propeller upwind of the vane's axis [m].
+
+    Returns:
+        Axial wind [m/s] (positive when it blows onto the nose), transverse speed [m/s], direction
+        of the transverse wind in the plane of rotation [rad]. Kristensen (1994), (93).
+    """
+    c = math.cos(phi)
+    s = math.sin(phi)
+    axial = -(wind_x * c + wind_y * s)
+    lateral = -wind_x * s + wind_y * c - arm * air_turn
+    return axial, math.hypot(lateral, wind_z), math.atan2(wind_z, lateral)
+
+
+@compiled
+def integrate_propeller_vane(
+    rotor: RotorParameters,
+    vane: VaneParameters,
+    arm: float,
+    wind: FloatArray,
+    yaw_rate: FloatArray,
+    gravity: FloatArray,
+    density_ratio: FloatArray,
+    temperature: FloatArray,
+    dt: float,
+    start: FloatArray,
+) -> FloatArray:
+    """A propeller on the nose of a vane in a sampled wind.
+
+    Args:
+        rotor: Constants of the propeller.
+        vane: Constants of the vane.
+        arm: Distance of the propeller upwind of the vane's axis [m].
+        wind: Wind in the sensor frame [m/s], shape (n, 3), linear between the samples.
+        yaw_rate, gravity, density_ratio, temperature: As in `integrate_vane`, `integrate_cup`.
+        dt: Sampling interval [s].
+        start: y [m/s] (negative: in equilibrium), psi [rad], phi [rad] (NaN: into the wind),
+            phi rate [rad/s]; shape (4,).
+
+    Returns:
+        Columns y [m/s], psi [rad], phi [rad, continuous], phi rate [rad/s]; shape (n, 4).
+    """
+    n = wind.shape[0]
+    out = np.empty((n, 4))
+    y, psi, phi, rate = start[0], start[1], start[2], start[3]
+    if math.isnan(phi):
+        phi = math.atan2(-wind[0, 1], -wind[0, 0]) + vane.aerodynamic_offset
+    axial, transverse, lateral = propeller_axes(
+        wind[0, 0], wind[0, 1], wind[0, 2], phi, rate + yaw_rate[0], arm
+    )
+    if y < 0.0:
+        y = max(rotor_forcing(rotor, axial, transverse, lateral)[0], 0.0)
+    out[0, 0], out[0, 1], out[0, 2], out[0, 3] = y, psi, phi, rate
+    for i in range(1, n):
+        phi, rate = advance_vane(
+            vane, phi, rate, (wind[i - 1, 0], wind[i, 0]), (wind[i - 1, 1], wind[i, 1]),
+            (yaw_rate[i - 1], yaw_rate[i]), (gravity[i, 0], gravity[i, 1]), density_ratio[i], dt,
+        )  # fmt: skip
+        axial_next, transverse_next, lateral_next = propeller_axes(
+            wind[i, 0], wind[i, 1], wind[i, 2], phi, rate + yaw_rate[i], arm
+        )
+        y, psi = advance_rotor(
+            rotor, y, psi, (axial, axial_next), (transverse, transverse_next),
+            (lateral, lateral_next), density_ratio[i], temperature[i], dt,
+        )  # fmt: skip
+        axial, transverse, lateral = axial_next, transverse_next, lateral_next
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = y, psi, phi, rate
+    return out

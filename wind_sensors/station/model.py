@@ -1,0 +1,369 @@
+"""The station: what is mounted, where, with which constants, and what is known to be wrong.
+
+One schema serves recordings, simulations and node parameters. Everything that can be wrong with an
+instrument is a key whose default is the healthy value, so that a station file can state it, the
+simulator can plant it, the estimator can undo it and the diagnosis can fit it. All values are SI
+with angles in radians, except keys that end in `_deg`.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Vector3 = tuple[float, float, float]
+
+
+class Entry(BaseModel):
+    """A part of the station file: unknown keys are errors, values do not change."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Input(Entry):
+    """Where a signal comes from: any message type with a numeric field.
+
+    A bare topic name in the file means the default type of that signal.
+    """
+
+    topic: str
+    type: str = ""
+    """ROS message type, e.g. `std_msgs/msg/Header`; empty: the default of the signal."""
+    field: str = ""
+    """Numeric field, e.g. `position[0]`, `data`, `wind.speed`; empty: the default of the type."""
+    meaning: Literal["edge", "edges", "count", "angle", "frequency", "value"] = "value"
+    """What the field holds: an edge's time, a batch of them, a running count, a cumulative angle,
+    a pulse frequency [Hz], or the value itself."""
+    scale: float = 1.0
+    offset: float = 0.0
+    modulus: float | None = None
+    """Value at which a running count wraps to zero."""
+    steps: tuple[tuple[float, float], ...] = ()
+    """Pairs (raw value, angle in degrees) of a stepped vane."""
+
+
+class WakeShadow(Entry):
+    """Wind deficit behind an obstacle, Gaussian in the wind's direction."""
+
+    bearing_from_deg: float
+    """Direction the wind comes from when the sensor is in the middle of the wake."""
+    depth: float = Field(ge=-1.0, le=1.0)
+    """Relative loss of speed in the middle (negative: speed-up)."""
+    width_deg: Positive
+    """Standard deviation of the Gaussian."""
+
+
+class FlowDistortion(Entry):
+    """Smooth speed-up and deflection around the mount, as a Fourier series in the wind direction.
+
+    The direction the wind comes from, counter-clockwise from the sensor's x axis, is theta:
+    speed factor 1 + c1 cos theta + s1 sin theta + c2 cos 2 theta + s2 sin 2 theta.
+    """
+
+    cosine_1: float = 0.0
+    sine_1: float = 0.0
+    cosine_2: float = 0.0
+    sine_2: float = 0.0
+
+
+class Electronics(Entry):
+    """From the shaft to the stamp: what the pulse circuit and the logger do to the edges."""
+
+    dead_time: NonNegative = 0.0
+    """Edges closer than this to the last accepted one are lost [s]."""
+    loss_probability: float = Field(default=0.0, ge=0.0, lt=1.0)
+    """Share of the edges lost at random."""
+    bounce_probability: float = Field(default=0.0, ge=0.0, lt=1.0)
+    """Share of the edges followed by a false one."""
+    bounce_delay: Positive = 0.002
+    """Delay of the false edge [s]."""
+    slot_errors: tuple[float, ...] = ()
+    """Displacement of each slot, as a fraction of the nominal slot width; one per slot."""
+
+
+class Clock(Entry):
+    """Time stamps of one instrument against the truth."""
+
+    latency: float = 0.0
+    """Stamp minus time of measurement [s]."""
+    drift: float = Field(default=0.0, gt=-0.1, lt=0.1)
+    """Rate error of the instrument's clock [s/s], counted from the start of the recording."""
+
+
+class Outage(Entry):
+    """An interval in which the sensor repeats its last value (or delivers nothing, a rotor)."""
+
+    start: float
+    """Seconds since the start of the recording."""
+    stop: float
+
+
+class Instrument(Entry):
+    """What every instrument has."""
+
+    name: str
+    profile: str = ""
+    """Name of the shipped profile whose constants were used as defaults."""
+    clock: Clock = Clock()
+    outages: tuple[Outage, ...] = ()
+    wake_shadows: tuple[WakeShadow, ...] = ()
+    flow_distortion: FlowDistortion = FlowDistortion()
+    tilt_deg: tuple[float, float] = (0.0, 0.0)
+    """Lean of the axis towards the sensor's x and y, against the platform's up."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Place relative to the station's sensor position, in the sensor frame [m]."""
+
+
+class Rotor(Instrument):
+    """What cups and propellers share."""
+
+    pulses: Input
+    pulses_per_revolution: int = Field(ge=1)
+    calibration_distance: Positive
+    """Wind run per radian l [m/rad]."""
+    distance_constant: Positive
+    """l0 [m], at the calibration's air density."""
+    arm_radius: Positive | None = None
+    a4: float = Field(default=1.0, gt=-1.0, lt=3.0)
+    """Share of the torque's slope that follows the wind; 1 follows Kristensen et al. (2014)."""
+    reference_density: Positive = 1.225
+    """Air density of the calibration [kg/m^3]."""
+    calibration_gain: Positive = 1.0
+    calibration_offset: float = 0.0
+    friction_speed: NonNegative = 0.0
+    """U_s [m/s]: friction beyond the calibration's, as the speed whose torque it balances."""
+    friction_temperature_coefficient: float = 0.0
+    """Relative change of the friction per kelvin; negative when cold stiffens the bearing."""
+    reference_temperature: float = 15.0
+    """[deg C]"""
+    inertia_factor: Positive = 1.0
+    torque_harmonic: NonNegative = 0.0
+    torque_harmonic_phase_deg: float = 0.0
+    electronics: Electronics = Electronics()
+
+
+class Cup(Rotor):
+    """A cup anemometer, axis up."""
+
+    kind: Literal["cup"] = "cup"
+    starting_speed: float = Field(default=0.0, ge=0.0, lt=5.0)
+    """Calibration offset U0 [m/s]: l S = U - U0."""
+    mu1: float = Field(default=0.0, gt=-2.0, lt=2.0)
+    mu2: float = Field(default=0.0, gt=-3.0, lt=3.0)
+
+
+class Propeller(Rotor):
+    """A propeller, on a vane or on a fixed axis."""
+
+    kind: Literal["propeller"] = "propeller"
+    mounted_on: str = ""
+    """Name of the vane that carries it; empty: fixed along `axis`."""
+    distance_to_vane_axis: float = 0.0
+    """Upwind distance of the rotor from the vane's axis [m]."""
+    axis: Vector3 | None = None
+    """Unit vector of a fixed axis in the sensor frame; wind along it turns the rotor forward."""
+    stall_speed: NonNegative = 0.0
+    """U_s [m/s] of the healthy propeller: P omega = U - U_s^2/U."""
+    angular_response_deg: tuple[float, ...] = ()
+    angular_response: tuple[float, ...] = ()
+    """f(theta) at `angular_response_deg`; empty: cosine."""
+    mu2: float | None = None
+    """With a value, the propeller of Kristensen (1994), (30), instead of Jackson's."""
+    angular_response_change: float = Field(default=0.0, gt=-3.0, lt=3.0)
+    """Added curvature: f(theta) + change (1 - cos theta) cos theta."""
+
+    @model_validator(mode="after")
+    def _table_is_complete(self) -> Propeller:
+        angles, values = self.angular_response_deg, self.angular_response
+        if len(angles) != len(values):
+            raise ValueError(
+                f"angular_response has {len(values)} values for {len(angles)} angles in "
+                "angular_response_deg: give one value per angle"
+            )
+        if any(b <= a for a, b in pairwise(angles)):
+            raise ValueError("angular_response_deg must increase from 0 to 180")
+        return self
+
+
+class Angle(Instrument):
+    """What vanes and bivanes share."""
+
+    distance_constant: Positive
+    """l_v [m], at the reference density."""
+    damping_ratio: Positive
+    reference_density: Positive = 1.225
+    inertia_factor: Positive = 1.0
+    damping_factor: NonNegative = 1.0
+    friction_speed: NonNegative = 0.0
+    """h_f [m/s]: the vane sticks while h^2 |sin(deviation)| < h_f^2."""
+    imbalance: float = 0.0
+    """b [1/m]: angular acceleration per acceleration across the nose."""
+    offset_deg: float = 0.0
+    """Reading minus heading, counter-clockwise (mounting offset)."""
+    reversed: bool = False
+    """The sensor counts clockwise."""
+    eccentricity_deg: NonNegative = 0.0
+    """Amplitude of a once-per-turn reading error."""
+    eccentricity_phase_deg: float = 0.0
+    """Heading at which the eccentricity error passes zero upwards."""
+    quantisation_deg: NonNegative = 0.0
+    gap_centre_deg: float = 0.0
+    gap_width_deg: float = Field(default=0.0, ge=0.0, lt=360.0)
+    """Dead gap of a potentiometer; inside it the reading is `gap_reading_deg`."""
+    gap_reading_deg: float | None = None
+    """None: the reading stays at the nearest edge of the gap."""
+    filter_time_constant: NonNegative = 0.0
+    """First-order low-pass on the angle [s]."""
+    noise_deg: NonNegative = 0.0
+
+
+class Vane(Angle):
+    """A wind vane, axis up."""
+
+    kind: Literal["vane"] = "vane"
+    joint_states: Input
+
+
+class Bivane(Angle):
+    """A vane that follows azimuth and elevation."""
+
+    kind: Literal["bivane"] = "bivane"
+    azimuth: Input
+    elevation: Input
+    speed: str = ""
+    """Name of the instrument whose speed sets the bivane's response."""
+
+
+AnyInstrument = Annotated[Cup | Propeller | Vane | Bivane, Field(discriminator="kind")]
+
+
+class Reference(Entry):
+    """An independent wind in the recording, and how far it can be trusted."""
+
+    kind: Literal["sonic", "tunnel", "truth"] = "sonic"
+    topic: Input
+    separation: NonNegative = 0.0
+    """Distance from the station's sensors [m]."""
+    path_length: NonNegative = 0.0
+    """Length over which it averages [m]."""
+    noise: NonNegative = 0.02
+    """Standard deviation of one sample's noise [m/s]."""
+
+
+class Air(Entry):
+    """Topics of the air's state."""
+
+    temperature: Input | None = None
+    pressure: Input | None = None
+
+
+class HeadingDeviation(Entry):
+    """Compass error added to the true heading: A + B sin(heading) + C cos(heading)."""
+
+    constant_deg: float = 0.0
+    sine_deg: float = 0.0
+    cosine_deg: float = 0.0
+
+
+class Downwash(Entry):
+    """Rotor inflow of a multirotor at the sensor."""
+
+    induced_velocity: float = 0.0
+    """Vertical induced velocity at hover, at the sensor [m/s], positive downwards."""
+    wake_skew: float = 0.0
+    """Horizontal share of it per unit of airspeed over induced velocity."""
+
+
+class Platform(Entry):
+    """The moving carrier of the station."""
+
+    odometry: Input | None = None
+    imu: Input | None = None
+    twist: Input | None = None
+    sensor_position: Vector3 = (0.0, 0.0, 0.0)
+    """Sensor in the platform's frame (x forward, y left, z up) [m]."""
+    sensor_rotation_deg: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw of the sensor frame in the platform's frame."""
+    velocity_scale: float = 1.0
+    """Reported over true speed (log or GNSS scale error)."""
+    velocity_share: float = 1.0
+    """Share of the platform's velocity that reaches the sensor's signals (0: already removed)."""
+    heading_deviation: HeadingDeviation = HeadingDeviation()
+    downwash: Downwash = Downwash()
+    clock: Clock = Clock()
+    heading_reference: Literal["true", "magnetic"] = "true"
+    magnetic_declination_deg: float = 0.0
+    attitude_noise_deg: NonNegative = 0.5
+    velocity_noise: NonNegative = 0.05
+
+
+class Change(Entry):
+    """Something that is different from one moment on, or for a while."""
+
+    start: float = 0.0
+    """Seconds since the start of the recording."""
+    stop: float | None = None
+    """None: to the end."""
+    instrument: str
+    """Name of the instrument, or `platform`."""
+    set: dict[str, Any]
+    """Keys of that entry with the values they have in the interval."""
+
+
+class RecordingInfo(Entry):
+    """When and where."""
+
+    start: str = "1970-01-01T00:00:00Z"
+    frame: str = "enu"
+    measuring_height: Positive = 10.0
+    roughness_length: Positive = 0.03
+
+
+class Station(Entry):
+    """The whole station file."""
+
+    recording: RecordingInfo = RecordingInfo()
+    instruments: tuple[AnyInstrument, ...] = Field(min_length=1)
+    reference: Reference | None = None
+    air: Air = Air()
+    platform: Platform | None = None
+    sensor_heading_deg: float = 0.0
+    """Heading of the sensor's x axis on a mast, counter-clockwise from east."""
+    changes: tuple[Change, ...] = ()
+
+    @model_validator(mode="after")
+    def _names_fit_together(self) -> Station:
+        names = [i.name for i in self.instruments]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two instruments are called '{name}': give each its own name")
+        for instrument in self.instruments:
+            if isinstance(instrument, Propeller) and instrument.mounted_on:
+                carriers = [v.name for v in self.instruments if isinstance(v, Vane)]
+                if instrument.mounted_on not in carriers:
+                    raise ValueError(
+                        f"'{instrument.name}' is mounted on '{instrument.mounted_on}', which is "
+                        f"not a vane of this station; vanes: {', '.join(carriers) or 'none'}"
+                    )
+        for change in self.changes:
+            if change.instrument != "platform" and change.instrument not in names:
+                raise ValueError(
+                    f"a change names '{change.instrument}', which is not in the station; "
+                    f"instruments: {', '.join(names)}"
+                )
+        return self
+
+    def instrument(self, name: str) -> Cup | Propeller | Vane | Bivane:
+        """The instrument of that name.
+
+        Raises:
+            KeyError: No instrument has the name.
+        """
+        for instrument in self.instruments:
+            if instrument.name == name:
+                return instrument
+        raise KeyError(name)

@@ -1,0 +1,105 @@
+"""The signals of a station as plain arrays, whatever they came from.
+
+Times are nanoseconds of the recording's clock as integers, so that live and offline processing
+see the same numbers; differences become seconds as floats where they enter an equation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """Edges of one rotor.
+
+    Attributes:
+        time: Edge times in the order of arrival [ns], shape (n,).
+        turns: Revolutions the rotor had made at each edge, where the source tells (a counter, an
+            angle); None where every edge is one slot. Shape (n,).
+    """
+
+    time: TimeArray
+    turns: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Angles:
+    """Readings of one vane: heading of the nose, counter-clockwise from x [rad]; shape (n,)."""
+
+    time: TimeArray
+    angle: FloatArray
+
+
+@dataclass(frozen=True)
+class Winds:
+    """Wind velocity of a reference: east, north, up [m/s], shape (n, 3)."""
+
+    time: TimeArray
+    velocity: FloatArray
+
+
+@dataclass(frozen=True)
+class PlatformStates:
+    """Attitude and motion of the carrier.
+
+    Attributes:
+        time: [ns], shape (n,).
+        attitude: Quaternion x, y, z, w that turns platform axes into ENU, shape (n, 4).
+        velocity: Of the platform's origin, in platform axes [m/s], shape (n, 3).
+        angular_rate: In platform axes [rad/s], shape (n, 3).
+        position: ENU [m], shape (n, 3).
+    """
+
+    time: TimeArray
+    attitude: FloatArray
+    velocity: FloatArray
+    angular_rate: FloatArray
+    position: FloatArray
+
+
+@dataclass(frozen=True)
+class Series:
+    """A scalar over time (temperature in deg C, pressure in Pa); shape (n,)."""
+
+    time: TimeArray
+    value: FloatArray
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A station and all its signals.
+
+    Attributes:
+        name: For messages and files.
+        station: The station.
+        start, stop: First and last time of the recording [ns].
+        pulses: By rotor name.
+        angles: By vane name; a bivane has `<name>` (azimuth) and `<name>/elevation`.
+        reference: Reference wind, if any.
+        platform: Carrier, if any.
+        temperature, pressure: Air, if any.
+        truth: True wind at the sensor, if a simulator wrote it.
+        notes: What reading the recording had to say (bad lines, truncated bag, ...).
+    """
+
+    name: str
+    station: Station
+    start: int
+    stop: int
+    pulses: dict[str, Pulses] = field(default_factory=dict)
+    angles: dict[str, Angles] = field(default_factory=dict)
+    reference: Winds | None = None
+    platform: PlatformStates | None = None
+    temperature: Series | None = None
+    pressure: Series | None = None
+    truth: Winds | None = None
+    notes: tuple[str, ...] = ()
