@@ -39,12 +39,12 @@ def response_table(
     cosine = np.cos(np.radians(grid))
     if angles_deg:
         inside = np.clip(grid, angles_deg[0], angles_deg[-1])
-        table = np.asarray(PchipInterpolator(angles_deg, values)(inside), dtype=np.float64)
+        values_at = PchipInterpolator(angles_deg, values)
+        table: npt.NDArray[np.float64] = np.asarray(values_at(inside), dtype=np.float64)
     else:
         table = cosine.copy()
     table += change * (1.0 - cosine) * cosine
-    table.setflags(write=False)
-    return table.copy()
+    return table
 
 
 def rotor_parameters(rotor: Cup | Propeller) -> RotorParameters:
