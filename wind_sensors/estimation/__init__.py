@@ -1,1 +1,25 @@
-"""Signals to wind."""
+"""Signals to wind: streaming estimators that give the same bits live and offline."""
+
+from wind_sensors.estimation.outputs import (
+    BiasTerm,
+    HealthItem,
+    HealthLevel,
+    ProcessedRecording,
+    WindEstimate,
+    WindowStatistics,
+)
+from wind_sensors.estimation.settings import METHODS, EstimatorSettings, Method
+from wind_sensors.estimation.streaming import StreamingEstimator
+
+__all__ = [
+    "METHODS",
+    "BiasTerm",
+    "EstimatorSettings",
+    "HealthItem",
+    "HealthLevel",
+    "Method",
+    "ProcessedRecording",
+    "StreamingEstimator",
+    "WindEstimate",
+    "WindowStatistics",
+]
