@@ -1,1 +1,6 @@
-"""Bags, tables and logs: the only room that opens files."""
+"""Bags, tables and NMEA files: the edge where files become signals and signals become files."""
+
+from wind_sensors.recordings.reading import read_recording
+from wind_sensors.recordings.station_files import load_station
+
+__all__ = ["load_station", "read_recording"]

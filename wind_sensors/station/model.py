@@ -21,7 +21,9 @@ Vector3 = tuple[float, float, float]
 class Entry(BaseModel):
     """A part of the station file: unknown keys are errors, values do not change."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 class Input(Entry):
@@ -50,7 +52,8 @@ class WakeShadow(Entry):
     """Wind deficit behind an obstacle, Gaussian in the wind's direction."""
 
     bearing_from_deg: float
-    """Direction the wind comes from when the sensor is in the middle of the wake."""
+    """Direction the wind comes from when the sensor is in the middle of the wake: clockwise from
+    north on a mast, clockwise from the bow of the apparent wind on a platform."""
     depth: float = Field(ge=-1.0, le=1.0)
     """Relative loss of speed in the middle (negative: speed-up)."""
     width_deg: Positive
@@ -290,6 +293,10 @@ class Platform(Entry):
     """Roll, pitch, yaw of the sensor frame in the platform's frame."""
     velocity_scale: float = 1.0
     """Reported over true speed (log or GNSS scale error)."""
+    frame: Literal["enu", "ned"] = "enu"
+    """Convention of the odometry: ENU with forward-left-up axes, or NED with forward-right-down."""
+    velocity_axes: Literal["platform", "earth"] = "platform"
+    """Axes in which the velocity is reported."""
     velocity_share: float = 1.0
     """Share of the platform's velocity that reaches the sensor's signals (0: already removed)."""
     heading_deviation: HeadingDeviation = HeadingDeviation()

@@ -1,0 +1,288 @@
+"""From a bag to the signals of a station."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
+from wind_sensors.recordings.fields import batches, columns, leaf, stamps
+from wind_sensors.recordings.platform import platform_states
+from wind_sensors.recordings.station_files import load_station
+from wind_sensors.station.inputs import (
+    FieldPath,
+    Signal,
+    angle_inputs,
+    angles_from_raw,
+    field_path,
+    resolved,
+    scaled,
+    turns_from_raw,
+)
+from wind_sensors.station.model import Angle, Cup, Input, Propeller, Station
+from wind_sensors.station.signals import (
+    Angles,
+    FloatArray,
+    PlatformStates,
+    Pulses,
+    Recording,
+    Series,
+    TimeArray,
+    Winds,
+)
+
+STATION_FILE = "recording.yaml"
+BAG_FOLDER = "bag"
+TRUTH_TOPIC = "/truth/wind"
+Mask = npt.NDArray[np.bool_]
+
+
+def read_recording(path: str | Path, station_file: str | Path | None = None) -> Recording:
+    """Read a recording.
+
+    Args:
+        path: Folder with `recording.yaml` and `bag/`, or a bag (then `station_file` is needed).
+        station_file: Station file that replaces the recording's own.
+
+    Returns:
+        The station and its signals; what was wrong with them is in `notes`.
+
+    Raises:
+        UserError: There is no such recording, its bag or its station file cannot be read, or the
+            bag has none of the station's topics.
+    """
+    folder = Path(path)
+    if not folder.exists():
+        raise UserError("there is no such recording.", str(path), "Check the path.")
+    own_file = folder / STATION_FILE
+    bag = folder / BAG_FOLDER if (folder / BAG_FOLDER).exists() else folder
+    if station_file is None and not own_file.exists():
+        raise UserError(
+            f"there is no {STATION_FILE} beside the bag.",
+            str(path),
+            "Name the station file with --station FILE.",
+        )
+    station = load_station(own_file if station_file is None else station_file)
+    name = folder.name or folder.resolve().name
+    return signals_of(read_bag(bag), station, name, str(path))
+
+
+def signals_of(content: BagContent, station: Station, name: str, where: str) -> Recording:
+    """Signals of a station from the messages of a bag.
+
+    Args:
+        content: The bag.
+        station: The station.
+        name: Name of the recording.
+        where: For messages.
+
+    Raises:
+        UserError: No topic of any instrument is in the bag, or a field does not exist.
+    """
+    reader = _SignalReader(content, where, list(content.notes))
+    pulses: dict[str, Pulses] = {}
+    angles: dict[str, Angles] = {}
+    wanted = 0
+    for instrument in station.instruments:
+        if isinstance(instrument, (Cup, Propeller)):
+            wanted += 1
+            rotor_pulses = reader.pulses(instrument)
+            if rotor_pulses is not None:
+                pulses[instrument.name] = rotor_pulses
+        else:
+            for signal, source in angle_inputs(instrument).items():
+                wanted += 1
+                readings = reader.angles(instrument, signal, source)
+                if readings is not None:
+                    angles[signal] = readings
+    if wanted and not pulses and not angles:
+        raise UserError(
+            "the bag has none of the station's topics.",
+            where,
+            f"Topics in the bag: {', '.join(sorted(content.topics)) or 'none'}.",
+        )
+    reference = reader.winds(station.reference.topic) if station.reference else None
+    truth_topic = next((t for t in content.topics if t.endswith(TRUTH_TOPIC)), None)
+    truth = reader.winds(Input(topic=truth_topic)) if truth_topic else None
+    platform = platform_states(station, content, reader.notes) if station.platform else None
+    temperature = reader.series(station.air.temperature, "temperature")
+    pressure = reader.series(station.air.pressure, "pressure")
+    start, stop = _span(content, pulses, angles, reference, platform)
+    return Recording(
+        name=name,
+        station=station,
+        start=start,
+        stop=stop,
+        pulses=pulses,
+        angles=angles,
+        reference=reference,
+        platform=platform,
+        temperature=temperature,
+        pressure=pressure,
+        truth=truth,
+        notes=tuple(reader.notes),
+    )
+
+
+@dataclass
+class _SignalReader:
+    """Reads one signal after the other and collects the notes."""
+
+    content: BagContent
+    where: str
+    notes: list[str] = field(default_factory=list)
+
+    def pulses(self, rotor: Cup | Propeller) -> Pulses | None:
+        source = resolved(rotor.pulses, "pulses")
+        data = self._topic(source, f"the pulses of '{rotor.name}'")
+        if data is None:
+            return None
+        path = field_path(source.field)
+        if source.meaning == "edges":
+            found = batches(data.raw, self.content.types, data.message_type, path)
+            time = np.concatenate([np.empty(0, dtype=np.int64), *found])
+            self._note_order(source.topic, time)
+            return Pulses(time)
+        if source.meaning == "edge":
+            time = stamps(data.raw, self.content.types, data.message_type, path)
+            time = time[self._stamped(source.topic, time)]
+            self._note_order(source.topic, time)
+            return Pulses(time)
+        time, raw = self._numbers(source, data, path)
+        turns, restarts = turns_from_raw(source, rotor, time.tolist(), raw.tolist())
+        if restarts:
+            self.notes.append(f"{source.topic}: the counter restarted {restarts} times")
+        return Pulses(time, turns)
+
+    def angles(self, vane: Angle, signal: str, source: Input) -> Angles | None:
+        data = self._topic(source, f"the angle of '{signal}'")
+        if data is None:
+            return None
+        time, raw = self._numbers(source, data, field_path(source.field))
+        return Angles(time, angles_from_raw(source, raw))
+
+    def series(self, stated: Input | None, signal: Signal) -> Series | None:
+        if stated is None:
+            return None
+        source = resolved(stated, signal)
+        data = self._topic(source, f"the air's {signal}")
+        if data is None:
+            return None
+        time, raw = self._numbers(source, data, field_path(source.field))
+        return Series(time, scaled(source, raw))
+
+    def winds(self, stated: Input) -> Winds | None:
+        source = resolved(stated, "wind")
+        data = self._topic(source, "the wind")
+        if data is None:
+            return None
+        base = field_path(source.field)
+        paths: list[FieldPath] = [(*base, axis) for axis in ("x", "y", "z")]
+        for path in paths:
+            self._check(source, data, path)
+        raw = np.stack(columns(data.raw, self.content.types, data.message_type, paths), axis=-1)
+        time = self._time(data)
+        keep = self._finite(source.topic, np.all(np.isfinite(raw), axis=-1), time)
+        self._note_order(source.topic, time[keep])
+        return Winds(time[keep], scaled(source, raw[keep]))
+
+    def _topic(self, source: Input, purpose: str) -> TopicData | None:
+        data = self.content.topics.get(source.topic)
+        if data is None or not data.raw:
+            self.notes.append(f"{source.topic}: no messages ({purpose})")
+            return None
+        if data.message_type != source.type:
+            raise UserError(
+                f"{source.topic} carries {data.message_type}, but the station file expects "
+                f"{source.type} there.",
+                self.where,
+                f"Write `{{topic: {source.topic}, type: {data.message_type}, field: ...}}`.",
+            )
+        return data
+
+    def _numbers(
+        self, source: Input, data: TopicData, path: FieldPath
+    ) -> tuple[TimeArray, FloatArray]:
+        self._check(source, data, path)
+        (raw,) = columns(data.raw, self.content.types, data.message_type, [path])
+        time = self._time(data)
+        keep = self._finite(source.topic, np.isfinite(raw), time)
+        self._note_order(source.topic, time[keep])
+        return time[keep], raw[keep]
+
+    def _check(self, source: Input, data: TopicData, path: FieldPath) -> None:
+        try:
+            kind = leaf(self.content.types, data.message_type, path)
+        except UserError as problem:
+            raise UserError(problem.what, f"{self.where}: {source.topic}", problem.remedy) from None
+        if kind.endswith("[]") or "/" in kind or "string" in kind:
+            raise UserError(
+                f"the field '{source.field}' of {data.message_type} is not a number ({kind}).",
+                f"{self.where}: {source.topic}",
+                "Name a numeric field, e.g. `position[0]`.",
+            )
+
+    def _time(self, data: TopicData) -> TimeArray:
+        """Header stamps where the type has a header and fills it, times of recording elsewhere."""
+        logged = np.asarray(data.log_time, dtype=np.int64)
+        fields = dict(self.content.types.fielddefs[data.message_type][1])
+        if "header" not in fields:
+            return logged
+        stamped = stamps(data.raw, self.content.types, data.message_type, ("header", "stamp"))
+        return np.where(stamped == 0, logged, stamped)
+
+    def _stamped(self, topic: str, time: TimeArray) -> Mask:
+        present: Mask = time != 0
+        missing = int(np.count_nonzero(~present))
+        if missing:
+            self.notes.append(f"{topic}: {missing} messages without a stamp were left out")
+        return present
+
+    def _finite(self, topic: str, finite: Mask, time: TimeArray) -> Mask:
+        bad = int(np.count_nonzero(~finite))
+        if bad:
+            first = (int(time[~finite][0]) - int(time[0])) * 1e-9
+            self.notes.append(
+                f"{topic}: {bad} of {len(time)} values are not numbers and were left out "
+                f"(the first at {first:.3f} s)"
+            )
+        return finite
+
+    def _note_order(self, topic: str, time: TimeArray) -> None:
+        self.notes.extend(order_notes(topic, time))
+
+
+def order_notes(topic: str, time: TimeArray) -> list[str]:
+    """What is unusual in the order of stamps: repeated ones and ones that run back."""
+    step = np.diff(time)
+    found = []
+    for bad, what in ((step == 0, "repeated"), (step < 0, "earlier than the one before")):
+        count = int(np.count_nonzero(bad))
+        if count:
+            at = (int(time[1:][bad][0]) - int(time[0])) * 1e-9
+            found.append(f"{topic}: {count} stamps {what} (the first at {at:.3f} s)")
+    return found
+
+
+def _span(
+    content: BagContent,
+    pulses: dict[str, Pulses],
+    angles: dict[str, Angles],
+    reference: Winds | None,
+    platform: PlatformStates | None,
+) -> tuple[int, int]:
+    """First and last stamp of the instruments, or times of recording where there is none."""
+    parts: list[TimeArray] = [p.time for p in pulses.values()]
+    parts += [a.time for a in angles.values()]
+    parts += [part.time for part in (reference, platform) if part is not None]
+    parts = [part for part in parts if len(part)]
+    if not parts:
+        logged = [np.asarray(t.log_time, dtype=np.int64) for t in content.topics.values()]
+        parts = [part for part in logged if len(part)]
+    if not parts:
+        return 0, 0
+    return min(int(part.min()) for part in parts), max(int(part.max()) for part in parts)

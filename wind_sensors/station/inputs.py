@@ -1,0 +1,266 @@
+"""What an `Input` means: the defaults of each signal and the way from raw numbers to SI units.
+
+The functions here see plain numbers only, so that a node (one message at a time) and the reader of
+a recording (whole arrays) turn the same messages into the same bits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from wind_sensors.errors import UserError
+from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Vane
+from wind_sensors.station.signals import FloatArray
+
+Signal = Literal[
+    "pulses", "angle", "wind", "temperature", "pressure", "odometry", "imu", "twist"
+]
+FieldPath = tuple[str | int, ...]
+Meaning = Literal["edge", "edges", "count", "angle", "frequency", "value"]
+
+DEFAULT_TYPES: dict[Signal, str] = {
+    "pulses": "std_msgs/msg/Header",
+    "angle": "sensor_msgs/msg/JointState",
+    "wind": "geometry_msgs/msg/Vector3Stamped",
+    "temperature": "sensor_msgs/msg/Temperature",
+    "pressure": "sensor_msgs/msg/FluidPressure",
+    "odometry": "nav_msgs/msg/Odometry",
+    "imu": "sensor_msgs/msg/Imu",
+    "twist": "geometry_msgs/msg/TwistStamped",
+}
+
+DEFAULT_FIELDS: dict[str, str] = {
+    "std_msgs/msg/Header": "stamp",
+    "sensor_msgs/msg/TimeReference": "time_ref",
+    "sensor_msgs/msg/JointState": "position[0]",
+    "sensor_msgs/msg/Temperature": "temperature",
+    "sensor_msgs/msg/FluidPressure": "fluid_pressure",
+    "sensor_msgs/msg/RelativeHumidity": "relative_humidity",
+    "geometry_msgs/msg/Vector3": "",
+    "geometry_msgs/msg/Vector3Stamped": "vector",
+    "geometry_msgs/msg/Twist": "linear",
+    "geometry_msgs/msg/TwistStamped": "twist.linear",
+    "geometry_msgs/msg/TwistWithCovarianceStamped": "twist.twist.linear",
+    "nav_msgs/msg/Odometry": "",
+    "sensor_msgs/msg/Imu": "",
+}
+
+_ROTOR_MEANINGS: dict[str, Meaning] = {
+    "std_msgs/msg/Header": "edge",
+    "sensor_msgs/msg/TimeReference": "edge",
+    "std_msgs/msg/Int64MultiArray": "edges",
+    "sensor_msgs/msg/JointState": "angle",
+    "std_msgs/msg/Float32": "frequency",
+    "std_msgs/msg/Float64": "frequency",
+}
+
+
+def full_type(name: str) -> str:
+    """`std_msgs/Header` as `std_msgs/msg/Header`; full names stay."""
+    parts = name.split("/")
+    return f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else name
+
+
+def resolved(source: Input, signal: Signal) -> Input:
+    """The input with type, field and meaning filled in.
+
+    Args:
+        source: As the station file states it; empty keys mean the default.
+        signal: What the input delivers.
+
+    Returns:
+        The same input without empty type and meaning. For a rotor, `meaning: value` is kept only
+        where the file says so; the default follows from the type: edges for Header, TimeReference
+        and Int64MultiArray, an angle for JointState, a frequency for floats, a count for the rest.
+    """
+    message_type = full_type(source.type) if source.type else DEFAULT_TYPES[signal]
+    meaning: Meaning = source.meaning
+    if signal == "pulses" and "meaning" not in source.model_fields_set:
+        meaning = _ROTOR_MEANINGS.get(message_type, "count")
+    return source.model_copy(
+        update={
+            "type": message_type,
+            "field": source.field or DEFAULT_FIELDS.get(message_type, "data"),
+            "meaning": meaning,
+        }
+    )
+
+
+def elevation_input(azimuth: Input, elevation: Input) -> Input:
+    """The elevation of a bivane; on the azimuth's topic it is the second joint by default."""
+    same_topic = elevation.topic == azimuth.topic and not elevation.field
+    message_type = full_type(elevation.type) or DEFAULT_TYPES["angle"]
+    if same_topic and message_type == DEFAULT_TYPES["angle"]:
+        elevation = elevation.model_copy(update={"field": "position[1]"})
+    return resolved(elevation, "angle")
+
+
+def field_path(field: str) -> FieldPath:
+    """`wind.data[3]` as ("wind", "data", 3).
+
+    Raises:
+        UserError: The text is not a path of names and indices.
+    """
+    path: list[str | int] = []
+    for part in field.split(".") if field else []:
+        match = re.fullmatch(r"([A-Za-z_]\w*)((?:\[\d+\])*)", part)
+        if match is None:
+            raise UserError(
+                f"'{field}' is not a field of a message.",
+                remedy="Write names joined by dots, indices in brackets: `position[0]`.",
+            )
+        path.append(match[1])
+        path.extend(int(index) for index in re.findall(r"\d+", match[2]))
+    return tuple(path)
+
+
+def field_value(message: Any, path: FieldPath) -> Any:
+    """The field of a message object at a path from `field_path`.
+
+    Raises:
+        AttributeError, IndexError: The message has no such field.
+    """
+    for step in path:
+        message = message[step] if isinstance(step, int) else getattr(message, step)
+    return message
+
+
+def scaled(source: Input, raw: FloatArray) -> FloatArray:
+    """scale * raw + offset."""
+    return np.asarray(source.scale * raw + source.offset, dtype=np.float64)
+
+
+def angles_from_raw(source: Input, raw: FloatArray) -> FloatArray:
+    """Angle of a vane from the raw field.
+
+    Args:
+        source: With `steps`, the raw value nearest in the table decides; without, scale and
+            offset turn the raw value into radians.
+        raw: Values of the field, shape (n,).
+
+    Returns:
+        Angle counter-clockwise from the sensor's x axis [rad], shape (n,); NaN stays NaN.
+    """
+    if not source.steps:
+        return scaled(source, raw)
+    table = np.asarray(sorted(source.steps), dtype=np.float64)
+    borders = 0.5 * (table[1:, 0] + table[:-1, 0])
+    angle = np.radians(table[np.searchsorted(borders, raw), 1])
+    return np.where(np.isfinite(raw), angle, np.nan)
+
+
+class TurnReading(NamedTuple):
+    """What one rotor message told.
+
+    Attributes:
+        turns: Revolutions since the first message.
+        restarted: The source went back and was taken to have restarted from zero.
+    """
+
+    turns: float
+    restarted: bool
+
+
+class TurnCounter:
+    """Turns counts, angles, frequencies or indicated speeds into revolutions.
+
+    Args:
+        source: Resolved input of the rotor; `meaning` is count, angle, frequency or value.
+        rotor: The rotor, for its pulses per revolution and its calibration.
+    """
+
+    def __init__(self, source: Input, rotor: Cup | Propeller) -> None:
+        self._source = source
+        self._rotor = rotor
+        self._previous: float | None = None
+        self._previous_ns = 0
+        self._turns = 0.0
+
+    def add(self, time_ns: int, raw: float) -> TurnReading | None:
+        """One message in order of arrival.
+
+        Args:
+            time_ns: Stamp [ns].
+            raw: Value of the field.
+
+        Returns:
+            The reading, or None where the value is not a number.
+        """
+        if not np.isfinite(raw):
+            return None
+        value = self._source.scale * raw + self._source.offset
+        restarted = False
+        if self._source.meaning in {"count", "angle"}:
+            step = 0.0 if self._previous is None else value - self._previous
+            if self._source.modulus is not None:
+                wrap = self._source.modulus * abs(self._source.scale)
+                step -= wrap * np.floor(step / wrap + 0.5)
+            elif step < 0.0 and time_ns > self._previous_ns:
+                # A counter only counts up: going back with the time going on is a restart.
+                restarted = self._source.meaning == "count"
+                step = value if restarted else step
+            per_turn = (
+                float(self._rotor.pulses_per_revolution)
+                if self._source.meaning == "count"
+                else 2.0 * np.pi
+            )
+            self._turns += step / per_turn
+        elif self._previous is not None:
+            seconds = max(time_ns - self._previous_ns, 0) * 1e-9
+            self._turns += self._turn_rate(value) * seconds
+        self._previous, self._previous_ns = value, time_ns
+        return TurnReading(float(self._turns), restarted)
+
+    def _turn_rate(self, value: float) -> float:
+        if self._source.meaning == "frequency":
+            return value / self._rotor.pulses_per_revolution
+        if isinstance(self._rotor, Cup):
+            spinning = max(value - self._rotor.starting_speed, 0.0)
+        else:
+            stall = self._rotor.stall_speed
+            spinning = value - stall**2 / value if value > stall else 0.0
+        return spinning / (2.0 * np.pi * self._rotor.calibration_distance)
+
+
+def turns_from_raw(
+    source: Input, rotor: Cup | Propeller, time: Iterable[int], raw: Iterable[float]
+) -> tuple[FloatArray, int]:
+    """`TurnCounter` over whole arrays.
+
+    Args:
+        source: Resolved input of the rotor.
+        rotor: The rotor.
+        time: Stamps [ns].
+        raw: Values of the field.
+
+    Returns:
+        Revolutions at each stamp (NaN where the value was not a number) and the number of
+        restarts.
+    """
+    counter = TurnCounter(source, rotor)
+    turns: list[float] = []
+    restarts = 0
+    for stamp, value in zip(time, raw, strict=True):
+        reading = counter.add(int(stamp), float(value))
+        turns.append(float("nan") if reading is None else reading.turns)
+        restarts += reading is not None and reading.restarted
+    return np.asarray(turns, dtype=np.float64), restarts
+
+
+def angle_inputs(vane: Angle) -> dict[str, Input]:
+    """Resolved inputs of a vane or bivane by the name of their signal.
+
+    A vane delivers `<name>`; a bivane `<name>` (azimuth) and `<name>/elevation`.
+    """
+    if isinstance(vane, Vane):
+        return {vane.name: resolved(vane.joint_states, "angle")}
+    if isinstance(vane, Bivane):
+        return {
+            vane.name: resolved(vane.azimuth, "angle"),
+            f"{vane.name}/elevation": elevation_input(vane.azimuth, vane.elevation),
+        }
+    return {}

@@ -1,0 +1,153 @@
+"""What is wrong with a station file, in words: place, key, fault, remedy."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any, NamedTuple
+
+from pydantic_core import ErrorDetails
+
+from wind_sensors.station.document import Document, Path
+from wind_sensors.station.schema import KINDS, entry_at, field_at, meaning
+
+
+class Problem(NamedTuple):
+    """One fault of a file."""
+
+    where: str
+    key: str
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        key = f"{self.key}: " if self.key else ""
+        return f"{self.where}: {key}{self.what} {self.remedy}".rstrip()
+
+
+class Ceiling(NamedTuple):
+    """The largest value that can be meant in SI, and what a larger one probably is."""
+
+    value: float
+    hint: str
+
+
+_LENGTH = "Lengths are in metres; this looks like millimetres or centimetres."
+CEILINGS: dict[str, Ceiling] = {
+    "calibration_distance": Ceiling(5.0, f"Wind run per radian. {_LENGTH}"),
+    "distance_constant": Ceiling(60.0, _LENGTH),
+    "arm_radius": Ceiling(1.0, _LENGTH),
+    "distance_to_vane_axis": Ceiling(5.0, _LENGTH),
+    "measuring_height": Ceiling(500.0, _LENGTH),
+    "roughness_length": Ceiling(10.0, _LENGTH),
+    "path_length": Ceiling(2.0, _LENGTH),
+    "reference_density": Ceiling(5.0, "Densities are in kg/m^3; this looks like g/m^3."),
+    "reference_temperature": Ceiling(100.0, "Temperatures are in deg C; this looks like kelvin."),
+    "damping_ratio": Ceiling(5.0, "The ratio is 1 at critical damping; this looks like percent."),
+    "dead_time": Ceiling(1.0, "Times are in seconds; this looks like milliseconds."),
+    "bounce_delay": Ceiling(1.0, "Times are in seconds; this looks like milliseconds."),
+    "latency": Ceiling(60.0, "Times are in seconds; this looks like milliseconds."),
+    "filter_time_constant": Ceiling(60.0, "Times are in seconds; this looks like milliseconds."),
+}
+
+
+def problem_of(error: ErrorDetails, document: Document, given: Any) -> Problem:
+    """One fault found by the schema, in words.
+
+    Args:
+        error: As pydantic tells it.
+        document: The text, for the lines.
+        given: The data that was validated (with the constants of profiles filled in).
+    """
+    path = plain_path(error["loc"], given)
+    what, remedy = _words(error, path, given)
+    return Problem(document.where(path), _shown(path), what, remedy)
+
+
+def implausible(document: Document, data: Any, path: Path = ()) -> list[Problem]:
+    """Values that are allowed by the schema but in the wrong unit by all appearance."""
+    found: list[Problem] = []
+    items = enumerate(data) if isinstance(data, list) else data.items()
+    for step, value in items:
+        here: Path = (*path, step)
+        if isinstance(value, (dict, list)):
+            found += implausible(document, value, here)
+        elif isinstance(value, (int, float)) and step in CEILINGS:
+            ceiling = CEILINGS[step]
+            if abs(value) > ceiling.value:
+                what = f"{value:g} is larger than any instrument's ({ceiling.value:g})."
+                found.append(Problem(document.where(here), _shown(here), what, ceiling.hint))
+    return found
+
+
+def plain_path(location: tuple[int | str, ...], data: Any) -> Path:
+    """Pydantic's location without the names of the alternatives it went through."""
+    path: list[str | int] = []
+    for position, step in enumerate(location):
+        last = position == len(location) - 1
+        if isinstance(data, dict):
+            if step in data or (last and step not in KINDS):
+                path.append(step)
+                data = data.get(step)
+        elif isinstance(data, list) and isinstance(step, int):
+            path.append(step)
+            data = data[step] if step < len(data) else None
+    return tuple(path)
+
+
+def _shown(path: Path) -> str:
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text
+
+
+def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:
+    kind = error["type"]
+    context = error.get("ctx", {})
+    told = meaning(field_at(path, data))
+    about = f"It is: {told}" if told else ""
+    given = error["input"]
+    if kind == "extra_forbidden":
+        return _unknown_key(path, data)
+    if kind == "missing":
+        what = "missing"
+        if path and path[-1] == "kind":
+            return f"{what}.", f"Add one of: {', '.join(KINDS)}."
+        return f"{what}.", f"Add `{path[-1]}: ...`. {about}".strip()
+    if kind == "union_tag_not_found":
+        return "the instrument has no kind.", f"Add `kind:` with one of: {', '.join(KINDS)}."
+    if kind == "union_tag_invalid":
+        tag = str(context.get("tag"))
+        close = get_close_matches(tag, KINDS, n=1)
+        guess = f" Did you mean '{close[0]}'?" if close else ""
+        return f"there is no instrument of kind '{tag}'.", f"Kinds: {', '.join(KINDS)}.{guess}"
+    if kind == "literal_error":
+        return f"'{given}' is not one of the choices.", f"Choose {context.get('expected')}."
+    if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
+        relation = {
+            "greater_than": ("above", "gt"),
+            "greater_than_equal": ("at least", "ge"),
+            "less_than": ("below", "lt"),
+            "less_than_equal": ("at most", "le"),
+        }[kind]
+        limit = f"It must be {relation[0]} {context[relation[1]]:g}."
+        return f"{given} is outside the range.", f"{limit} {about}".rstrip()
+    if kind.startswith(("float", "int", "decimal", "finite")):
+        number = "a whole number" if kind.startswith("int") else "a number"
+        return f"'{given}' is not {number}.", about
+    if kind in {"model_type", "model_attributes_type", "dict_type"}:
+        return f"'{given}' stands where a group of keys belongs.", about
+    if kind in {"tuple_type", "list_type"}:
+        return f"'{given}' stands where a list belongs.", about
+    if kind == "value_error":
+        return f"{error['msg'].removeprefix('Value error, ')}.", ""
+    return f"{error['msg']}.", about
+
+
+def _unknown_key(path: Path, data: Any) -> tuple[str, str]:
+    model = entry_at(path[:-1], data)
+    known = list(model.model_fields) if model is not None else []
+    close = get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
+    if close:
+        return "unknown key.", f"Did you mean `{close[0]}`?"
+    return "unknown key.", f"Keys here: {', '.join(known)}."
