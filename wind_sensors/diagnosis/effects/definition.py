@@ -1,0 +1,141 @@
+"""What a left-out piece of physics is, for the diagnosis and for users who add their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from wind_sensors.station.model import Change, Instrument, Platform, Station
+
+PLATFORM = "platform"
+"""Name under which the carrier appears among the instruments."""
+
+Entrance = Literal["wind", "response", "output", "clock"]
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    Attributes:
+        name: As in the verdict, e.g. `friction_speed`.
+        unit: For people, e.g. `m/s`.
+        low, high: Bounds of the search.
+        healthy: Value at which the effect is absent; None for a parameter that only places or
+            shapes the effect (a bearing, a width).
+        minimum: Smallest departure from `healthy` worth reporting.
+        starts: Values from which the search begins (besides the screening's estimate).
+        step: Size of a finite difference; 0: a tenth of `minimum`, or of the bounds' distance.
+        wraps: Period of an angle, 0 for none.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    healthy: float | None = 0.0
+    minimum: float = 0.0
+    starts: tuple[float, ...] = ()
+    step: float = 0.0
+    wraps: float = 0.0
+
+    @property
+    def difference(self) -> float:
+        """Step of a finite difference."""
+        if self.step:
+            return self.step
+        return 0.1 * self.minimum if self.minimum else 0.02 * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A piece of physics that a station may lack.
+
+    Attributes:
+        name: Identifier in the verdict.
+        meaning: One sentence.
+        entrance: Where it enters: the wind at the sensor, the equation of motion, the output or
+            the clock.
+        equation: In plain text.
+        source: Where the equation comes from.
+        region: Where it shows, in words.
+        parameters: In the order of the fit.
+        applies: Whether an entry of the station (an instrument or the platform) can have it.
+        update: From the entry and the values, the keys of the entry that change.
+        templates: Starting points of the screening; each gives every parameter a value. The
+            screening uses one signature per template.
+        confusable: Effects it can be mistaken for, with the measurement that separates them.
+        needs: Data without which it cannot be seen.
+        size: From the values, size in units of the smallest size worth reporting; None takes
+            the largest departure over the parameters' `minimum`.
+    """
+
+    name: str
+    meaning: str
+    entrance: Entrance
+    equation: str
+    source: str
+    region: str
+    parameters: tuple[Parameter, ...]
+    applies: Callable[[Instrument | Platform, Station], bool]
+    update: Callable[[Instrument | Platform, Values], dict[str, Any]]
+    templates: tuple[dict[str, float], ...]
+    confusable: Mapping[str, str] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+    size: Callable[[Values], float] | None = None
+
+    def relative_size(self, values: Values) -> float:
+        """Size of the effect in units of the smallest size worth reporting."""
+        if self.size is not None:
+            return self.size(values)
+        sizes = [
+            abs(values[p.name] - p.healthy) / p.minimum
+            for p in self.parameters
+            if p.healthy is not None and p.minimum > 0.0
+        ]
+        return max(sizes, default=0.0)
+
+
+def entry_of(station: Station, instrument: str) -> Instrument | Platform:
+    """The instrument or the platform of that name.
+
+    Raises:
+        KeyError: The station has no such entry.
+    """
+    if instrument == PLATFORM:
+        if station.platform is None:
+            raise KeyError(instrument)
+        return station.platform
+    return station.instrument(instrument)
+
+
+def with_keys(station: Station, instrument: str, keys: Mapping[str, Any]) -> Station:
+    """The station with keys of one entry changed, without validation (values come from a fit)."""
+    if instrument == PLATFORM:
+        assert station.platform is not None
+        return station.model_copy(update={"platform": station.platform.model_copy(update=keys)})
+    return station.model_copy(
+        update={
+            "instruments": tuple(
+                entry.model_copy(update=keys) if entry.name == instrument else entry
+                for entry in station.instruments
+            )
+        }
+    )
+
+
+def with_effect(
+    station: Station,
+    effect: Effect,
+    instrument: str,
+    values: Values,
+    interval: tuple[float, float | None] | None = None,
+) -> Station:
+    """The station with an effect, for good or within an interval [s since the start]."""
+    keys = effect.update(entry_of(station, instrument), values)
+    if interval is None or (interval[0] <= 0.0 and interval[1] is None):
+        return with_keys(station, instrument, keys)
+    change = Change(start=interval[0], stop=interval[1], instrument=instrument, set=keys)
+    return station.model_copy(update={"changes": (*station.changes, change)})

@@ -1,0 +1,223 @@
+"""Effects between the shaft and the stamp: pulses, outages, clocks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.station.model import (
+    Angle,
+    Clock,
+    Electronics,
+    Instrument,
+    Outage,
+    Platform,
+    Rotor,
+    Station,
+)
+
+Entry = Instrument | Platform
+
+
+def _is_rotor(entry: Entry, station: Station) -> bool:
+    return isinstance(entry, Rotor)
+
+
+def _is_sensor(entry: Entry, station: Station) -> bool:
+    return isinstance(entry, Rotor | Angle)
+
+
+def _electronics(entry: Entry, **keys: Any) -> dict[str, Electronics]:
+    assert isinstance(entry, Rotor)
+    return {"electronics": entry.electronics.model_copy(update=keys)}
+
+
+def _missed(entry: Entry, values: Values) -> dict[str, Any]:
+    return _electronics(
+        entry, dead_time=values["dead_time"], loss_probability=values["loss_probability"]
+    )
+
+
+def _missed_size(values: Values) -> float:
+    return max(values["dead_time"] / 0.004, values["loss_probability"] / 0.01)
+
+
+MISSED_PULSES = Effect(
+    name="missed_pulses",
+    meaning="Pulses are lost: those that follow too soon on the last one, or some at random.",
+    entrance="output",
+    equation="an edge is lost if it comes within the dead time of the last accepted one, "
+    "or with the loss probability",
+    source="counter with a non-paralysable dead time",
+    region="high rotor rates; doubled pulse intervals",
+    parameters=(
+        Parameter("dead_time", "s", 0.0, 0.5, minimum=0.004, step=0.0005),
+        Parameter("loss_probability", "1", 0.0, 0.9, minimum=0.01, step=0.003),
+    ),
+    applies=_is_rotor,
+    update=_missed,
+    templates=(
+        {"dead_time": 0.0, "loss_probability": 0.01},
+    ),
+    confusable={
+        "calibration_drift": "pulse intervals: lost pulses double some of them",
+        "encoder_slot_error": "pulse intervals against rotor angle",
+    },
+    size=_missed_size,
+)
+
+
+def _extra(entry: Entry, values: Values) -> dict[str, Any]:
+    return _electronics(
+        entry,
+        bounce_probability=values["bounce_probability"],
+        bounce_delay=values["bounce_delay"],
+    )
+
+
+EXTRA_PULSES = Effect(
+    name="extra_pulses",
+    meaning="A bouncing contact adds false pulses shortly after true ones.",
+    entrance="output",
+    equation="a second edge follows after the bounce delay, with the bounce probability",
+    source="contact bounce of a reed switch",
+    region="very short pulse intervals, all speeds",
+    parameters=(
+        Parameter("bounce_probability", "1", 0.0, 1.0, minimum=0.01, step=0.003, starts=(0.02,)),
+        Parameter("bounce_delay", "s", 0.0002, 0.1, healthy=None, step=0.0005),
+    ),
+    applies=_is_rotor,
+    update=_extra,
+    templates=({"bounce_probability": 0.01, "bounce_delay": 0.003},),
+    confusable={"calibration_drift": "pulse intervals: bounce makes some very short"},
+)
+
+
+def _slots(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    n = entry.pulses_per_revolution
+    errors = tuple(
+        values["sine"] * math.sin(2.0 * math.pi * k / n)
+        + values["cosine"] * math.cos(2.0 * math.pi * k / n)
+        for k in range(n)
+    )
+    return _electronics(entry, slot_errors=errors)
+
+
+ENCODER_SLOT_ERROR = Effect(
+    name="encoder_slot_error",
+    meaning="The slots of the pulse disc are not evenly spaced.",
+    entrance="output",
+    equation="edge of slot k at (k + error_k) 2 pi / n",
+    source="geometry of the disc",
+    region="pulse intervals against rotor angle, all speeds alike",
+    parameters=(
+        Parameter("sine", "1", -0.9, 0.9, minimum=0.04, step=0.01),
+        Parameter("cosine", "1", -0.9, 0.9, minimum=0.04, step=0.01),
+    ),
+    applies=lambda entry, station: isinstance(entry, Rotor) and entry.pulses_per_revolution > 1,
+    update=_slots,
+    templates=({"sine": 0.04, "cosine": 0.0},),
+    confusable={
+        "damaged_cup": "turn the rotor by hand: slot errors stay, the torque does not",
+        "missed_pulses": "pulse intervals against rotor angle",
+    },
+)
+
+
+def _outage(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Instrument)
+    outage = Outage.model_construct(start=values["start"], stop=values["stop"])
+    return {"outages": (*entry.outages, outage)}
+
+
+STUCK_SENSOR = Effect(
+    name="stuck_sensor",
+    meaning="The sensor repeats its last value, or falls silent, for a while.",
+    entrance="output",
+    equation="reading(t) = reading(start) for start < t < stop",
+    source="definition",
+    region="one interval of time",
+    parameters=(
+        Parameter("start", "s", -1.0, 1e6, healthy=None, step=1.0),
+        Parameter("stop", "s", 0.0, 1e6, healthy=None, step=1.0),
+    ),
+    applies=_is_sensor,
+    update=_outage,
+    templates=(),
+    confusable={
+        "vane_friction": "turn the vane by hand",
+        "bearing_friction": "turn the rotor by hand",
+    },
+    size=lambda values: max(values["stop"] - values["start"], 0.0) / 10.0,
+)
+
+
+def _clock(entry: Entry, **keys: float) -> dict[str, Any]:
+    assert isinstance(entry, Instrument | Platform)
+    return {"clock": entry.clock.model_copy(update=keys)}
+
+
+def _latency(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Instrument | Platform)
+    return {
+        "clock": Clock.model_construct(
+            latency=entry.clock.latency + values["latency"], drift=entry.clock.drift
+        )
+    }
+
+
+TIMESTAMP_LATENCY = Effect(
+    name="timestamp_latency",
+    meaning="Stamps come late by a constant time.",
+    entrance="clock",
+    equation="stamp = time of measurement + latency",
+    source="definition",
+    region="phase of the cross-spectrum, in proportion to frequency",
+    parameters=(
+        Parameter("latency", "s", -60.0, 60.0, minimum=0.15, step=0.05, starts=(0.3, 1.0, -0.5)),
+    ),
+    applies=_is_sensor,
+    update=_latency,
+    templates=({"latency": 0.15}, {"latency": 0.6}),
+    confusable={
+        "rotor_inertia": "a speed sweep: the lag of inertia is a length, of a clock a time",
+        "vane_inertia": "a speed sweep",
+        "low_pass_filter": "amplitudes: a filter damps what a delay only shifts",
+        "clock_drift": "a longer record: the lag of a drift grows",
+    },
+)
+
+
+def _drift(entry: Entry, values: Values) -> dict[str, Any]:
+    return _clock(entry, drift=values["drift"] * 1e-6)
+
+
+CLOCK_DRIFT = Effect(
+    name="clock_drift",
+    meaning="The instrument's clock runs fast or slow.",
+    entrance="clock",
+    equation="stamp = time of measurement * (1 + drift)",
+    source="definition",
+    region="a lag that grows with the length of the record",
+    parameters=(
+        Parameter(
+            "drift", "ppm", -20000.0, 20000.0, minimum=300.0, step=50.0,
+            starts=(1000.0, -1000.0, 3000.0, -3000.0),
+        ),
+    ),
+    applies=_is_sensor,
+    update=_drift,
+    templates=({"drift": 500.0},),
+    confusable={"timestamp_latency": "a longer record: the lag of a drift grows"},
+)
+
+EFFECTS = (
+    MISSED_PULSES,
+    EXTRA_PULSES,
+    ENCODER_SLOT_ERROR,
+    STUCK_SENSOR,
+    TIMESTAMP_LATENCY,
+    CLOCK_DRIFT,
+)

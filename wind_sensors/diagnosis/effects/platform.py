@@ -1,0 +1,223 @@
+"""Effects of the carrier: motion, frames, and its own wind."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.station.model import (
+    Downwash,
+    HeadingDeviation,
+    Instrument,
+    Platform,
+    Station,
+)
+
+Entry = Instrument | Platform
+
+
+def _is_platform(entry: Entry, station: Station) -> bool:
+    return isinstance(entry, Platform)
+
+
+def _share(entry: Entry, values: Values) -> dict[str, Any]:
+    return {"velocity_share": values["velocity_share"]}
+
+
+PLATFORM_VELOCITY = Effect(
+    name="platform_velocity",
+    meaning="The carrier's motion is not in the signals, or has been removed already.",
+    entrance="wind",
+    equation="apparent wind = wind - share * (V + omega x r)",
+    source="rigid-body kinematics",
+    region="with the carrier's speed and heading",
+    parameters=(
+        Parameter(
+            "velocity_share", "1", -1.0, 0.999, healthy=1.0, minimum=0.15, starts=(0.0,), step=0.02
+        ),
+    ),
+    applies=_is_platform,
+    update=_share,
+    templates=({"velocity_share": 0.9},),
+    confusable={
+        "platform_velocity_scale": "a run at another speed against an independent log",
+    },
+)
+
+
+def _velocity_scale(entry: Entry, values: Values) -> dict[str, Any]:
+    return {"velocity_scale": values["velocity_scale"]}
+
+
+PLATFORM_VELOCITY_SCALE = Effect(
+    name="platform_velocity_scale",
+    meaning="The carrier's speed is reported in a wrong scale.",
+    entrance="wind",
+    equation="V true = V reported / scale",
+    source="rigid-body kinematics",
+    region="with the carrier's speed and heading",
+    parameters=(
+        Parameter("velocity_scale", "1", 0.4, 2.5, healthy=1.0, minimum=0.05, step=0.01),
+    ),
+    applies=_is_platform,
+    update=_velocity_scale,
+    templates=({"velocity_scale": 1.05},),
+    confusable={
+        "platform_velocity": "a run at another speed against an independent log",
+        "lever_arm": "a straight run without turning: the lever arm falls silent",
+    },
+)
+
+
+def _lever(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Platform)
+    x, y, z = entry.sensor_position
+    return {"sensor_position": (x + values["dx"], y + values["dy"], z + values["dz"])}
+
+
+def _lever_size(values: Values) -> float:
+    return math.hypot(values["dx"], values["dy"], values["dz"]) / 0.5
+
+
+LEVER_ARM = Effect(
+    name="lever_arm",
+    meaning="The sensor does not sit where the station file says.",
+    entrance="wind",
+    equation="apparent wind = wind - V - omega x (r + d)",
+    source="rigid-body kinematics",
+    region="while the carrier rolls, pitches or turns",
+    parameters=tuple(
+        Parameter(name, "m", -6.0, 6.0, minimum=0.5, step=0.1) for name in ("dx", "dy", "dz")
+    ),
+    applies=_is_platform,
+    update=_lever,
+    templates=(
+        {"dx": 0.5, "dy": 0.0, "dz": 0.0},
+        {"dx": 0.0, "dy": 0.5, "dz": 0.0},
+        {"dx": 0.0, "dy": 0.0, "dz": 0.5},
+    ),
+    confusable={"vane_imbalance": "a straight run in calm water; a tape measure"},
+    size=_lever_size,
+)
+
+
+def _deviation(entry: Entry, values: Values) -> dict[str, Any]:
+    return {
+        "heading_deviation": HeadingDeviation.model_construct(
+            constant_deg=values["constant"], sine_deg=values["sine"], cosine_deg=values["cosine"]
+        )
+    }
+
+
+def _deviation_size(values: Values) -> float:
+    return max(abs(values["constant"]), math.hypot(values["sine"], values["cosine"])) / 2.0
+
+
+HEADING_DEVIATION = Effect(
+    name="heading_deviation",
+    meaning="The compass deviates, by a constant and with the heading.",
+    entrance="wind",
+    equation="heading reported = heading + A + B sin(heading) + C cos(heading)",
+    source="compass deviation, coefficients A, B, C",
+    region="with the carrier's heading",
+    parameters=(
+        Parameter("constant", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
+        Parameter("sine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
+        Parameter("cosine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
+    ),
+    applies=_is_platform,
+    update=_deviation,
+    templates=(
+        {"constant": 2.0, "sine": 0.0, "cosine": 0.0},
+        {"constant": 0.0, "sine": 2.0, "cosine": 0.0},
+        {"constant": 0.0, "sine": 0.0, "cosine": 2.0},
+    ),
+    confusable={
+        "vane_offset": "a full circle: a compass error changes with the heading",
+        "frame_error": "a full circle",
+    },
+    size=_deviation_size,
+)
+
+
+def _rotation(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Platform)
+    roll, pitch, yaw = entry.sensor_rotation_deg
+    return {
+        "sensor_rotation_deg": (
+            roll + values["roll"],
+            pitch + values["pitch"],
+            yaw + values["yaw"],
+        )
+    }
+
+
+def _rotation_size(values: Values) -> float:
+    return math.hypot(values["roll"], values["pitch"], values["yaw"]) / 3.0
+
+
+FRAME_ERROR = Effect(
+    name="frame_error",
+    meaning="The sensor's frame is turned against what the station file says.",
+    entrance="wind",
+    equation="sensor axes = R(roll, pitch, yaw) carrier axes",
+    source="REP-103",
+    region="all headings alike",
+    parameters=(
+        Parameter("roll", "deg", -180.0, 180.0, minimum=3.0, step=0.5),
+        Parameter("pitch", "deg", -180.0, 180.0, minimum=3.0, step=0.5),
+        Parameter("yaw", "deg", -270.0, 270.0, minimum=3.0, step=0.5, starts=(90.0, -90.0, 180.0)),
+    ),
+    applies=_is_platform,
+    update=_rotation,
+    templates=(
+        {"roll": 3.0, "pitch": 0.0, "yaw": 0.0},
+        {"roll": 0.0, "pitch": 3.0, "yaw": 0.0},
+        {"roll": 0.0, "pitch": 0.0, "yaw": 3.0},
+    ),
+    confusable={
+        "vane_offset": "sight the vane's mark along the keel",
+        "heading_deviation": "a full circle",
+    },
+    size=_rotation_size,
+)
+
+
+def _downwash(entry: Entry, values: Values) -> dict[str, Any]:
+    return {
+        "downwash": Downwash.model_construct(
+            induced_velocity=values["induced_velocity"], wake_skew=values["wake_skew"]
+        )
+    }
+
+
+ROTOR_DOWNWASH = Effect(
+    name="rotor_downwash",
+    meaning="The inflow of the carrier's own rotors reaches the sensor.",
+    entrance="wind",
+    equation="w' = w - v_i; u' = u - skew * v_i along the airspeed",
+    source="momentum theory of the hovering rotor",
+    region="strongest at low airspeed",
+    parameters=(
+        Parameter("induced_velocity", "m/s", -5.0, 15.0, minimum=0.3, step=0.1),
+        Parameter("wake_skew", "1", -2.0, 2.0, minimum=0.0, step=0.05),
+    ),
+    applies=_is_platform,
+    update=_downwash,
+    templates=(
+        {"induced_velocity": 0.5, "wake_skew": 0.0},
+        {"induced_velocity": 0.5, "wake_skew": 0.5},
+    ),
+    confusable={"calibration_offset": "rotors off, the same wind"},
+    size=lambda values: abs(values["induced_velocity"]) / 0.3,
+)
+
+EFFECTS = (
+    PLATFORM_VELOCITY,
+    PLATFORM_VELOCITY_SCALE,
+    LEVER_ARM,
+    HEADING_DEVIATION,
+    FRAME_ERROR,
+    ROTOR_DOWNWASH,
+)

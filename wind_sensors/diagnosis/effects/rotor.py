@@ -1,0 +1,301 @@
+"""Effects in the rotor's calibration and equation of motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.station.model import Cup, Instrument, Platform, Propeller, Rotor, Station
+
+Entry = Instrument | Platform
+
+
+def _is_rotor(entry: Entry, station: Station) -> bool:
+    return isinstance(entry, Rotor)
+
+
+def _set(*names: str) -> Any:
+    """Update that writes parameters into keys of the same name."""
+
+    def update(entry: Entry, values: Values) -> dict[str, Any]:
+        return {name: values[name] for name in names}
+
+    return update
+
+
+def _gain(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    return {"calibration_gain": entry.calibration_gain * values["gain"]}
+
+
+CALIBRATION_DRIFT = Effect(
+    name="calibration_drift",
+    meaning="The rotor turns faster or slower than calibrated, by a constant factor.",
+    entrance="response",
+    equation="l S = gain * U - U0",
+    source="K14, eq. (58)",
+    region="all speeds, in proportion",
+    parameters=(Parameter("gain", "1", 0.4, 2.0, healthy=1.0, minimum=0.01, step=0.004),),
+    applies=_is_rotor,
+    update=_gain,
+    templates=({"gain": 1.01},),
+    confusable={
+        "calibration_offset": "a speed sweep: a gain grows with speed, an offset does not",
+        "air_density": "a temperature or pressure swing",
+        "icing": "temperature; look at the cups",
+        "angular_response": "a wind with less vertical turbulence",
+        "torque_asymmetry": "a steadier wind: overspeeding needs turbulence",
+    },
+)
+
+
+def _offset(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    return {"calibration_offset": entry.calibration_offset + values["offset"]}
+
+
+CALIBRATION_OFFSET = Effect(
+    name="calibration_offset",
+    meaning="The rotor reads too much or too little by a constant speed.",
+    entrance="response",
+    equation="l S = U - U0 + offset",
+    source="K14, eq. (58)",
+    region="all speeds alike, in relative terms at low speed",
+    parameters=(Parameter("offset", "m/s", -3.0, 3.0, minimum=0.08, step=0.02),),
+    applies=_is_rotor,
+    update=_offset,
+    templates=({"offset": 0.08},),
+    confusable={
+        "bearing_friction": "a speed sweep: friction fades as 1/U, an offset stays",
+        "calibration_drift": "a speed sweep",
+    },
+)
+
+
+def _friction(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    speed = (entry.friction_speed**2 + values["friction_speed"] ** 2) ** 0.5
+    return {
+        "friction_speed": speed,
+        "friction_temperature_coefficient": values["temperature_coefficient"],
+    }
+
+
+BEARING_FRICTION = Effect(
+    name="bearing_friction",
+    meaning="The bearing brakes the rotor with a torque that does not depend on the wind.",
+    entrance="response",
+    equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 (1 + c (T - T0)); "
+    "steady y = U - U_s^2/U",
+    source="J80, eqs. (5), (6)",
+    region="low speeds; the rotor stalls below U_s",
+    parameters=(
+        Parameter(
+            "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 2.0)
+        ),
+        Parameter("temperature_coefficient", "1/K", -0.2, 0.05, minimum=0.0, step=0.01),
+    ),
+    applies=_is_rotor,
+    update=_friction,
+    templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0},),
+    confusable={
+        "calibration_offset": "a speed sweep: friction fades as 1/U, an offset stays",
+        "calibration_drift": "a speed sweep",
+        "icing": "a run-down test by hand in still air",
+    },
+)
+
+
+def _density(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    return {"reference_density": entry.reference_density * values["density_ratio"]}
+
+
+AIR_DENSITY = Effect(
+    name="air_density",
+    meaning="The air is lighter or denser than in the calibration, and the response not corrected.",
+    entrance="response",
+    equation="l0 = l0_cal * rho_cal / rho; friction weighs rho_cal / rho as much",
+    source="K94, eq. (6)",
+    region="with temperature and pressure; response length and low speeds",
+    parameters=(
+        Parameter("density_ratio", "1", 0.4, 2.5, healthy=1.0, minimum=0.1, step=0.04),
+    ),
+    applies=_is_rotor,
+    update=_density,
+    templates=({"density_ratio": 1.1},),
+    confusable={
+        "rotor_inertia": "a temperature or pressure swing",
+        "calibration_drift": "a temperature or pressure swing",
+    },
+)
+
+
+def _inertia(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    return {"inertia_factor": entry.inertia_factor * values["inertia_factor"]}
+
+
+ROTOR_INERTIA = Effect(
+    name="rotor_inertia",
+    meaning="The rotor is heavier (or lighter) than calibrated and answers gusts late.",
+    entrance="response",
+    equation="l0 = factor * l0_cal",
+    source="K94, eqs. (6), (8)",
+    region="high frequencies; k l0 near and above 1",
+    parameters=(
+        Parameter(
+            "inertia_factor", "1", 0.2, 12.0, healthy=1.0, minimum=0.3, step=0.1,
+            starts=(1.5, 3.0),
+        ),
+    ),
+    applies=_is_rotor,
+    update=_inertia,
+    templates=({"inertia_factor": 1.3},),
+    confusable={
+        "timestamp_latency": "a speed sweep: the lag of inertia is a length, of a clock a time",
+        "low_pass_filter": "a speed sweep: the lag of inertia is a length, of a filter a time",
+        "air_density": "a temperature or pressure swing",
+    },
+)
+
+TORQUE_ASYMMETRY = Effect(
+    name="torque_asymmetry",
+    meaning="The rotor speeds up more readily than it slows down, otherwise than assumed.",
+    entrance="response",
+    equation="l0 dy/dt = (A - y)(a4 A + (1 - a4) y)",
+    source="K94, eqs. (1), (2); K14, eq. (76)",
+    region="mean speed and skewness in strong turbulence",
+    parameters=(
+        Parameter("a4", "1", -0.9, 2.9, healthy=1.0, minimum=0.4, step=0.1),
+    ),
+    applies=lambda entry, station: isinstance(entry, Rotor),
+    update=_set("a4"),
+    templates=({"a4": 0.6},),
+    confusable={"calibration_drift": "a steadier wind: overspeeding needs turbulence"},
+)
+
+
+def _damage(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    return {
+        "torque_harmonic": values["torque_harmonic"],
+        "calibration_gain": entry.calibration_gain * values["gain"],
+    }
+
+
+DAMAGED_CUP = Effect(
+    name="damaged_cup",
+    meaning="One cup or blade pulls less than the others.",
+    entrance="response",
+    equation="torque += e A^2 cos(psi - alpha); steady rate times gain",
+    source="derived: one unequal cup of three",
+    region="once per revolution, locked to the wind's direction; a lower calibration",
+    parameters=(
+        Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.1, step=0.03, starts=(0.2,)),
+        Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.004, starts=(0.97,)),
+    ),
+    applies=_is_rotor,
+    update=_damage,
+    templates=(
+        {"torque_harmonic": 0.1, "gain": 1.0},
+    ),
+    confusable={
+        "encoder_slot_error": "turn the rotor by hand: slot errors stay, the torque does not",
+        "calibration_drift": "pulse intervals against rotor angle",
+    },
+)
+
+
+def _angular(entry: Entry, values: Values) -> dict[str, Any]:
+    if isinstance(entry, Cup):
+        return {"mu2": entry.mu2 + values["change"], "mu1": entry.mu1 + values["skewness"]}
+    assert isinstance(entry, Propeller)
+    return {"angular_response_change": entry.angular_response_change + values["change"]}
+
+
+ANGULAR_RESPONSE = Effect(
+    name="angular_response",
+    meaning="The rotor's answer to oblique wind is not the one on the certificate.",
+    entrance="response",
+    equation="cup: g = cos + (mu1 + skewness) sin + (mu2 + change)(1 - cos); "
+    "propeller: f + change (1 - cos) cos",
+    source="K14, eqs. (83), (84); J80, sec. 3.2",
+    region="strong vertical or lateral turbulence",
+    parameters=(
+        Parameter("change", "1", -3.0, 3.0, minimum=0.4, step=0.1),
+        Parameter("skewness", "1", -1.0, 1.0, minimum=0.1, step=0.03),
+    ),
+    applies=_is_rotor,
+    update=_angular,
+    templates=({"change": 0.4, "skewness": 0.0}, {"change": 0.0, "skewness": 0.1}),
+    confusable={
+        "calibration_drift": "a wind with less turbulence",
+        "axis_tilt": "a spirit level on the mount; wind from the opposite side",
+    },
+)
+
+
+def _icing(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    return {
+        "calibration_gain": entry.calibration_gain * values["gain"],
+        "inertia_factor": entry.inertia_factor * values["inertia_factor"],
+    }
+
+
+ICING = Effect(
+    name="icing",
+    meaning="Ice makes the rotor heavier and its cups or blades worse, at the same time.",
+    entrance="response",
+    equation="l S = gain * U - U0 and l0 = factor * l0_cal together",
+    source="K94, eq. (6)",
+    region="near and below 0 deg C; all speeds and high frequencies",
+    parameters=(
+        Parameter("gain", "1", 0.2, 1.1, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
+        Parameter(
+            "inertia_factor", "1", 0.8, 12.0, healthy=1.0, minimum=0.4, step=0.1, starts=(1.5,)
+        ),
+    ),
+    applies=_is_rotor,
+    update=_icing,
+    templates=({"gain": 0.97, "inertia_factor": 1.3},),
+    confusable={
+        "calibration_drift": "temperature; look at the cups",
+        "bearing_friction": "temperature; a run-down test by hand",
+    },
+    size=lambda v: min(abs(v["gain"] - 1.0) / 0.03, abs(v["inertia_factor"] - 1.0) / 0.3),
+)
+
+
+def _arm(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Propeller)
+    return {"distance_to_vane_axis": entry.distance_to_vane_axis + values["distance"]}
+
+
+PROPELLER_TRANSLATION = Effect(
+    name="propeller_translation",
+    meaning="The propeller swings with the vane at another distance from its axis than stated.",
+    entrance="response",
+    equation="lateral wind at the propeller += distance * d(phi)/dt",
+    source="K94, eq. (93)",
+    region="while the vane turns fast",
+    parameters=(Parameter("distance", "m", -2.0, 2.0, minimum=0.2, step=0.05),),
+    applies=lambda entry, station: isinstance(entry, Propeller) and bool(entry.mounted_on),
+    update=_arm,
+    templates=({"distance": 0.2}, {"distance": 0.6}),
+    confusable={"angular_response": "a tape measure; oblique wind in a tunnel"},
+)
+
+EFFECTS = (
+    CALIBRATION_DRIFT,
+    CALIBRATION_OFFSET,
+    BEARING_FRICTION,
+    AIR_DENSITY,
+    ROTOR_INERTIA,
+    TORQUE_ASYMMETRY,
+    DAMAGED_CUP,
+    ANGULAR_RESPONSE,
+    ICING,
+    PROPELLER_TRANSLATION,
+)

@@ -1,0 +1,156 @@
+"""Residual series in the cosine domain: shrinking to what the reference can know, whitening.
+
+The cosine transform (DCT-II) of a stationary residual has nearly independent coefficients whose
+variance is its spectrum, and unlike the Fourier transform it does not wrap the end of the record
+to its beginning. Everything linear that the diagnosis does to a series (shrinking, whitening) is a
+multiplication in that domain.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import dct, idct
+
+FloatArray = npt.NDArray[np.float64]
+
+_BAND_RATIO = 1.35
+_FIRST_BAND = 6
+_CHI_SQUARE_MEDIAN = 0.4549
+
+
+def to_cosine(series: FloatArray) -> FloatArray:
+    """Orthonormal DCT-II along the last axis."""
+    return np.asarray(dct(series, type=2, norm="ortho", axis=-1), dtype=np.float64)
+
+
+def from_cosine(coefficients: FloatArray) -> FloatArray:
+    """Inverse of `to_cosine`."""
+    return np.asarray(idct(coefficients, type=2, norm="ortho", axis=-1), dtype=np.float64)
+
+
+def cosine_frequencies(n: int, dt: float) -> FloatArray:
+    """Frequencies of the n coefficients [Hz]."""
+    return np.arange(n) / (2.0 * n * dt)
+
+
+def band_edges(n: int) -> npt.NDArray[np.intp]:
+    """First coefficient of each band, then n; bands grow geometrically with frequency."""
+    edges = [0, _FIRST_BAND]
+    while edges[-1] < n:
+        edges.append(min(n, max(edges[-1] + _FIRST_BAND, int(edges[-1] * _BAND_RATIO))))
+    if len(edges) > 2 and edges[-1] - edges[-2] < _FIRST_BAND:
+        edges.pop(-2)
+    return np.asarray(edges, dtype=np.intp)
+
+
+def band_means(values: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
+    """Mean of `values` within each band."""
+    sums = np.add.reduceat(values, edges[:-1])
+    return np.asarray(sums / np.diff(edges), dtype=np.float64)
+
+
+def band_medians(values: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
+    """Median of `values` within each band."""
+    return np.array(
+        [np.median(values[a:b]) for a, b in itertools.pairwise(edges)]
+    )
+
+
+def spread_over(band_values: FloatArray, edges: npt.NDArray[np.intp], n: int) -> FloatArray:
+    """Band values interpolated (linear in log frequency) to all n coefficients."""
+    centres = np.log(0.5 * (edges[:-1] + edges[1:] - 1) + 0.5)
+    return np.asarray(np.interp(np.log(np.arange(n) + 0.5), centres, band_values))
+
+
+@dataclass(frozen=True)
+class Coherence:
+    """Banded second moments of a measured and a simulated series.
+
+    Attributes:
+        edges: Bands, as indices of coefficients.
+        frequency: Centre of each band [Hz].
+        measured, simulated: Spectra (mean squared coefficients).
+        cross: Mean product.
+        squared: Squared coherence, corrected for the number of coefficients.
+    """
+
+    edges: npt.NDArray[np.intp]
+    frequency: FloatArray
+    measured: FloatArray
+    simulated: FloatArray
+    cross: FloatArray
+    squared: FloatArray
+
+
+def coherence_of(measured: FloatArray, simulated: FloatArray, dt: float, n: int) -> Coherence:
+    """Banded coherence of two cosine spectra of a series of n samples.
+
+    Args:
+        measured, simulated: Coefficients, the first of n.
+        dt: Sampling interval [s].
+        n: Length of the series.
+    """
+    edges = band_edges(len(measured))
+    m = band_means(measured * measured, edges)
+    s = band_means(simulated * simulated, edges)
+    c = band_means(measured * simulated, edges)
+    count = np.diff(edges)
+    raw = c * c / np.maximum(m * s, 1e-300)
+    squared = np.clip((raw - 1.0 / count) / (1.0 - 1.0 / count), 0.0, 1.0)
+    frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * n * dt)
+    return Coherence(edges, frequency, m, s, c, squared)
+
+
+def shrinkage(coherence: Coherence, exponent: FloatArray, n: int) -> FloatArray:
+    """Share of each simulated coefficient that the instrument can be expected to show.
+
+    An error of the reference alone gives the regression of the measured on the simulated series
+    the slope (squared coherence)^1, an error shared alike by both (a distance between them) the
+    slope (squared coherence)^(1/2). The exponent is learnt on healthy recordings; the coherence
+    comes from the recording itself, because it does not notice gains or lags.
+
+    Args:
+        coherence: Banded coherence of the recording.
+        exponent: At the bands of `coherence`.
+        n: Number of coefficients.
+    """
+    squared = np.maximum(coherence.squared, 1e-3)
+    # The slowest band decides about offsets and gains; there the wind's own changes are far
+    # larger than any error of the reference.
+    slope = squared**exponent
+    slope[0] = 1.0
+    full = spread_over(slope, coherence.edges, n)
+    full[0] = 1.0
+    return full
+
+
+def noise_variance(
+    residual: FloatArray, low_ratio: FloatArray | None, low_end: int
+) -> FloatArray:
+    """Smooth, robust variance of the coefficients of a residual.
+
+    Medians of the squares in each band, so that a few large coefficients (a line, a slow trend
+    that an effect causes) do not raise the variance they should be judged against. Below
+    `low_end` the residual holds what the effects do; there the variance follows the band above
+    it with the ratio that healthy recordings show.
+
+    Args:
+        residual: Cosine coefficients.
+        low_ratio: Healthy variance of each band relative to the first band above `low_end`; None
+            keeps the recording's own.
+        low_end: First coefficient whose own residual is trusted.
+    """
+    n = len(residual)
+    edges = band_edges(n)
+    variance = band_medians(residual * residual, edges) / _CHI_SQUARE_MEDIAN
+    if low_ratio is not None:
+        first = int(np.searchsorted(edges, low_end))
+        first = min(first, len(variance) - 3)
+        level = float(np.exp(np.mean(np.log(np.maximum(variance[first : first + 3], 1e-12)))))
+        variance[:first] = level * low_ratio[:first]
+    full = np.exp(spread_over(np.log(np.maximum(variance, 1e-12)), edges, n))
+    return np.asarray(full)
