@@ -37,13 +37,16 @@ class Input(Entry):
     """ROS message type, e.g. `std_msgs/msg/Header`; empty: the default of the signal."""
     field: str = ""
     """Numeric field, e.g. `position[0]`, `data`, `wind.speed`; empty: the default of the type."""
-    meaning: Literal["edge", "edges", "count", "angle", "frequency", "value"] = "value"
-    """What the field holds: an edge's time, a batch of them, a running count, a cumulative angle,
-    a pulse frequency [Hz], or the value itself."""
+    meaning: Literal["", "edge", "edges", "count", "angle", "frequency", "value"] = ""
+    """What the field holds: an edge's time, a batch of them, a running count of pulses, a
+    cumulative angle [rad], a pulse frequency [Hz], or the value itself (for a rotor the speed it
+    indicates [m/s]); empty: the default of the type."""
     scale: float = 1.0
+    """SI value = scale * field + offset."""
     offset: float = 0.0
-    modulus: float | None = None
-    """Value at which a running count wraps to zero."""
+    """SI value = scale * field + offset."""
+    modulus: float | None = Field(default=None, gt=0.0)
+    """Value of the field at which a running count or angle wraps to zero."""
     steps: tuple[tuple[float, float], ...] = ()
     """Pairs (raw value, angle in degrees) of a stepped vane."""
 

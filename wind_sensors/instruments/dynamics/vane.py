@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
-from wind_sensors.instruments.dynamics.rotor import RotorParameters, advance_rotor, rotor_forcing
+from wind_sensors.instruments.dynamics.rotor import RotorParameters, integrate_rotor
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -217,6 +217,22 @@ def propeller_axes(
 
 
 @compiled
+def propeller_vane_axes(
+    wind: FloatArray, phi: FloatArray, air_turn: FloatArray, arm: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`propeller_axes` for a whole record: wind (n, 3), the rest (n,); returns (n,) each."""
+    n = wind.shape[0]
+    axial = np.empty(n)
+    transverse = np.empty(n)
+    lateral = np.empty(n)
+    for i in range(n):
+        axial[i], transverse[i], lateral[i] = propeller_axes(
+            wind[i, 0], wind[i, 1], wind[i, 2], phi[i], air_turn[i], arm
+        )
+    return axial, transverse, lateral
+
+
+@compiled
 def integrate_propeller_vane(
     rotor: RotorParameters,
     vane: VaneParameters,
@@ -236,7 +252,7 @@ def integrate_propeller_vane(
         vane: Constants of the vane.
         arm: Distance of the propeller upwind of the vane's axis [m].
         wind: Wind in the sensor frame [m/s], shape (n, 3), linear between the samples.
-        yaw_rate, gravity, density_ratio, temperature: As in `integrate_vane`, `integrate_cup`.
+        yaw_rate, gravity, density_ratio, temperature: As in `integrate_vane`, `integrate_rotor`.
         dt: Sampling interval [s].
         start: y [m/s] (negative: in equilibrium), psi [rad], phi [rad] (NaN: into the wind),
             phi rate [rad/s]; shape (4,).
@@ -244,29 +260,15 @@ def integrate_propeller_vane(
     Returns:
         Columns y [m/s], psi [rad], phi [rad, continuous], phi rate [rad/s]; shape (n, 4).
     """
-    n = wind.shape[0]
-    out = np.empty((n, 4))
-    y, psi, phi, rate = start[0], start[1], start[2], start[3]
-    if math.isnan(phi):
-        phi = math.atan2(-wind[0, 1], -wind[0, 0]) + vane.aerodynamic_offset
-    axial, transverse, lateral = propeller_axes(
-        wind[0, 0], wind[0, 1], wind[0, 2], phi, rate + yaw_rate[0], arm
+    out = np.empty((wind.shape[0], 4))
+    phi, rate = integrate_vane(vane, wind, yaw_rate, gravity, density_ratio, dt, start[2], start[3])
+    axial, transverse, lateral = propeller_vane_axes(wind, phi, rate + yaw_rate, arm)
+    y_start = start[0] if start[0] >= 0.0 else math.nan
+    y, psi = integrate_rotor(
+        rotor, axial, transverse, lateral, density_ratio, temperature, dt, 1, y_start, start[1]
     )
-    if y < 0.0:
-        y = max(rotor_forcing(rotor, axial, transverse, lateral)[0], 0.0)
-    out[0, 0], out[0, 1], out[0, 2], out[0, 3] = y, psi, phi, rate
-    for i in range(1, n):
-        phi, rate = advance_vane(
-            vane, phi, rate, (wind[i - 1, 0], wind[i, 0]), (wind[i - 1, 1], wind[i, 1]),
-            (yaw_rate[i - 1], yaw_rate[i]), (gravity[i, 0], gravity[i, 1]), density_ratio[i], dt,
-        )  # fmt: skip
-        axial_next, transverse_next, lateral_next = propeller_axes(
-            wind[i, 0], wind[i, 1], wind[i, 2], phi, rate + yaw_rate[i], arm
-        )
-        y, psi = advance_rotor(
-            rotor, y, psi, (axial, axial_next), (transverse, transverse_next),
-            (lateral, lateral_next), density_ratio[i], temperature[i], dt,
-        )  # fmt: skip
-        axial, transverse, lateral = axial_next, transverse_next, lateral_next
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = y, psi, phi, rate
+    out[:, 0] = y
+    out[:, 1] = psi
+    out[:, 2] = phi
+    out[:, 3] = rate
     return out

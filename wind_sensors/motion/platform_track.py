@@ -1,0 +1,216 @@
+"""The carrier's motion at any instant: interpolated on the sphere, extrapolated within bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.errors import UserError
+from wind_sensors.motion import rotations
+from wind_sensors.station.signals import PlatformStates
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Attitude and motion of the carrier at n instants.
+
+    Attributes:
+        attitude: Quaternion x, y, z, w that turns platform axes into ENU, shape (n, 4).
+        velocity: Of the platform's origin, in platform axes [m/s], shape (n, 3).
+        angular_rate: In platform axes [rad/s], shape (n, 3).
+        position: ENU [m], shape (n, 3).
+    """
+
+    attitude: FloatArray
+    velocity: FloatArray
+    angular_rate: FloatArray
+    position: FloatArray
+
+    @cached_property
+    def to_earth(self) -> FloatArray:
+        """Matrices that turn platform axes into ENU, shape (n, 3, 3)."""
+        return rotations.matrix(self.attitude)
+
+    def __len__(self) -> int:
+        return int(self.attitude.shape[0])
+
+    def part(self, start: int, stop: int) -> Motion:
+        """The instants `start` to `stop` - 1."""
+        here = slice(start, stop)
+        return Motion(
+            self.attitude[here], self.velocity[here], self.angular_rate[here], self.position[here]
+        )
+
+
+@dataclass(frozen=True)
+class TrackSample:
+    """Motion at the instants asked for, and how far it can be trusted.
+
+    Attributes:
+        motion: The motion.
+        attitude_variance: Of each component of the attitude's small rotation [rad^2], (n,).
+        velocity_variance: Variance of each velocity component [m^2/s^2], (n,).
+        known: False where it would be guesswork, because the nearest state is too far; (n,).
+    """
+
+    motion: Motion
+    attitude_variance: FloatArray
+    velocity_variance: FloatArray
+    known: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class TrackLimits:
+    """How far states may be stretched, and how uncertain they get.
+
+    Attributes:
+        longest_extrapolation: Beyond the last (or before the first) state [s].
+        longest_gap: Between two states that are interpolated [s].
+        attitude_deviation: Standard deviation of a state's attitude [rad].
+        velocity_deviation: Standard deviation of a state's velocity components [m/s].
+        angular_acceleration: Typical unmodelled angular acceleration [rad/s^2].
+        acceleration: Typical unmodelled acceleration [m/s^2].
+    """
+
+    longest_extrapolation: float = 0.5
+    longest_gap: float = 2.0
+    attitude_deviation: float = 0.0087
+    velocity_deviation: float = 0.05
+    angular_acceleration: float = 0.5
+    acceleration: float = 1.0
+
+
+class PlatformTrack:
+    """A carrier's states as a function of time.
+
+    Between states the attitude follows the great circle and everything else a straight line.
+    Beyond them the platform keeps its turning rate and its velocity, and the variances grow with
+    the accelerations that may have happened unseen.
+
+    Args:
+        states: States in any order; doubles in time are dropped.
+        limits: How far they may be stretched.
+
+    Raises:
+        UserError: There is no usable state.
+    """
+
+    def __init__(self, states: PlatformStates, limits: TrackLimits | None = None) -> None:
+        self.limits = limits if limits is not None else TrackLimits()
+        finite = (
+            np.isfinite(states.attitude).all(axis=1)
+            & np.isfinite(states.velocity).all(axis=1)
+            & np.isfinite(states.angular_rate).all(axis=1)
+            & (np.linalg.norm(states.attitude, axis=1) > 0.5)
+        )
+        times, first = np.unique(states.time[finite], return_index=True)
+        if times.size == 0:
+            raise UserError(
+                "The platform has no usable state.",
+                "platform",
+                "Record its odometry with unit quaternions, or remove `platform` from the station.",
+            )
+        self._time: TimeArray = times
+        self._attitude = rotations.normalise(states.attitude[finite][first])
+        self._velocity = states.velocity[finite][first]
+        self._rate = states.angular_rate[finite][first]
+        self._position = states.position[finite][first]
+
+    @property
+    def start(self) -> int:
+        """Time of the first state [ns]."""
+        return int(self._time[0])
+
+    @property
+    def stop(self) -> int:
+        """Time of the last state [ns]."""
+        return int(self._time[-1])
+
+    def at(self, times: TimeArray) -> TrackSample:
+        """The motion at instants [ns], shape (n,)."""
+        wanted = np.asarray(times, dtype=np.int64)
+        count = self._time.size
+        left = np.clip(np.searchsorted(self._time, wanted, side="right") - 1, 0, max(count - 2, 0))
+        right = np.minimum(left + 1, count - 1)
+        span = (self._time[right] - self._time[left]).astype(np.float64) * 1e-9
+        since = (wanted - self._time[left]).astype(np.float64) * 1e-9
+        fraction = np.divide(since, span, out=np.zeros(wanted.shape), where=span > 0.0)
+        inside = np.clip(fraction, 0.0, 1.0)
+        weight = inside[:, np.newaxis]
+        motion = Motion(
+            attitude=rotations.slerp(self._attitude[left], self._attitude[right], inside),
+            velocity=(1.0 - weight) * self._velocity[left] + weight * self._velocity[right],
+            angular_rate=(1.0 - weight) * self._rate[left] + weight * self._rate[right],
+            position=(1.0 - weight) * self._position[left] + weight * self._position[right],
+        )
+        beyond = np.where(
+            wanted < self._time[0],
+            (wanted - self._time[0]) * 1e-9,
+            np.where(wanted > self._time[-1], (wanted - self._time[-1]) * 1e-9, 0.0),
+        )
+        motion = _carried_on(motion, beyond)
+        bulge: FloatArray = inside * (1.0 - inside) * span * span
+        return self._judged(motion, beyond, bulge, span)
+
+    def _judged(
+        self, motion: Motion, beyond: FloatArray, bulge: FloatArray, span: FloatArray
+    ) -> TrackSample:
+        """Variances: an acceleration a unseen for t adds a t^2/2 outside, a s(1-s) T^2/2 inside."""
+        limits = self.limits
+        unseen = 0.5 * (np.square(beyond) + bulge)
+        return TrackSample(
+            motion=motion,
+            attitude_variance=limits.attitude_deviation**2
+            + np.square(limits.angular_acceleration * unseen),
+            velocity_variance=limits.velocity_deviation**2
+            + np.square(limits.acceleration * (np.abs(beyond) + np.sqrt(bulge))),
+            known=(np.abs(beyond) <= limits.longest_extrapolation)
+            & ((span <= limits.longest_gap) | (bulge == 0.0)),
+        )
+
+
+def _carried_on(motion: Motion, seconds: FloatArray) -> Motion:
+    """The motion continued at constant turning rate and velocity for some seconds, per instant."""
+    if not np.any(seconds):
+        return motion
+    step = seconds[:, np.newaxis]
+    attitude = rotations.normalise(
+        rotations.multiply(
+            motion.attitude, rotations.from_rotation_vector(motion.angular_rate * step)
+        )
+    )
+    travelled = rotations.rotate(motion.attitude, motion.velocity) * step
+    return replace(motion, attitude=attitude, position=motion.position + travelled)
+
+
+def shifted(motion: Motion, dt: float, seconds: npt.ArrayLike) -> Motion:
+    """A regularly sampled motion, each instant read that many seconds later.
+
+    Args:
+        motion: At instants 0, dt, 2 dt, ...
+        dt: Interval [s].
+        seconds: Shift [s], scalar or shape (n,); reading beyond the ends stays at the ends.
+    """
+    count = len(motion)
+    place = np.clip(np.arange(count) + np.asarray(seconds, dtype=np.float64) / dt, 0.0, count - 1.0)
+    left = np.minimum(place.astype(np.int64), max(count - 2, 0))
+    right = np.minimum(left + 1, count - 1)
+    fraction = place - left
+    weight = fraction[:, np.newaxis]
+
+    def between(values: FloatArray) -> FloatArray:
+        line: FloatArray = (1.0 - weight) * values[left] + weight * values[right]
+        return line
+
+    return Motion(
+        attitude=rotations.slerp(motion.attitude[left], motion.attitude[right], fraction),
+        velocity=between(motion.velocity),
+        angular_rate=between(motion.angular_rate),
+        position=between(motion.position),
+    )

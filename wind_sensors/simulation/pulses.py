@@ -1,0 +1,206 @@
+"""From a turning rotor to stamped edges: slots, contacts, dead time, losses, clock."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+from wind_sensors.errors import UserError
+from wind_sensors.simulation import random_numbers
+from wind_sensors.simulation.clocks import stamps
+from wind_sensors.simulation.response import Response
+from wind_sensors.station.model import Rotor
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+
+@compiled
+def _crossing(p_0: float, p_1: float, slope_0: float, slope_1: float, level: float) -> float:
+    """Where in [0, 1] a cubic with given ends and end slopes passes a level between its ends.
+
+    Newton's method inside a shrinking bracket; slopes are per unit interval.
+    """
+    low, high = 0.0, 1.0
+    rising = p_1 > p_0
+    u = (level - p_0) / (p_1 - p_0)
+    c_2 = 3.0 * (p_1 - p_0) - 2.0 * slope_0 - slope_1
+    c_3 = -2.0 * (p_1 - p_0) + slope_0 + slope_1
+    for _ in range(60):
+        value = p_0 + u * (slope_0 + u * (c_2 + u * c_3)) - level
+        if (value > 0.0) == rising:
+            high = u
+        else:
+            low = u
+        slope = slope_0 + u * (2.0 * c_2 + 3.0 * u * c_3)
+        following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
+        if not low <= following <= high:
+            following = 0.5 * (low + high)
+        if abs(following - u) < 1e-14:
+            return following
+        u = following
+    return u
+
+
+@compiled
+def _edges_of(
+    psi: FloatArray, rate: FloatArray, dt: float, slot_angles: FloatArray
+) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Times at which slots pass the sensor, and the running number of each slot.
+
+    Args:
+        psi, rate: Rotor angle [rad] and rate [rad/s] every dt, shape (m,).
+        dt: [s].
+        slot_angles: Angle of each slot within a turn [rad], shape (slots,).
+
+    Returns:
+        Times since the first sample [s], numbers (slot + slots * turn); in order of time.
+    """
+    slots = slot_angles.shape[0]
+    width = 2.0 * math.pi / slots
+    room = 16
+    for i in range(psi.shape[0] - 1):
+        room += int(abs(psi[i + 1] - psi[i]) / width) + 3
+    times = np.empty(room)
+    numbers = np.empty(room, dtype=np.int64)
+    count = 0
+    for i in range(psi.shape[0] - 1):
+        a, b = psi[i], psi[i + 1]
+        if a == b:
+            continue
+        step = 1 if b > a else -1
+        number = math.floor(a / width) - step * 2
+        while True:
+            turn = number // slots
+            level = 2.0 * math.pi * turn + slot_angles[number - turn * slots]
+            if (step > 0 and level > b) or (step < 0 and level < b):
+                break
+            if (step > 0 and level > a) or (step < 0 and level < a):
+                u = _crossing(a, b, rate[i] * dt, rate[i + 1] * dt, level)
+                times[count] = (i + u) * dt
+                numbers[count] = number
+                count += 1
+            number += step
+    return times[:count], numbers[:count]
+
+
+@compiled
+def _after_dead_time(times: TimeArray, dead_time: int, last: int) -> npt.NDArray[np.bool_]:
+    """Which edges a circuit accepts that is blind for a while after each accepted one [ns]."""
+    accepted = np.empty(times.shape[0], dtype=np.bool_)
+    for i in range(times.shape[0]):
+        accepted[i] = times[i] - last >= dead_time
+        if accepted[i]:
+            last = times[i]
+    return accepted
+
+
+LONG_AGO = -(2**62)
+"""Before any edge [ns]."""
+
+
+def slot_angles(rotor: Rotor) -> FloatArray:
+    """Angle of each slot within a turn [rad], shape (pulses_per_revolution,).
+
+    Raises:
+        UserError: The slot errors do not fit the number of slots or change their order.
+    """
+    slots = rotor.pulses_per_revolution
+    errors = np.zeros(slots)
+    given = rotor.electronics.slot_errors
+    if given:
+        if len(given) != slots:
+            raise UserError(
+                f"'{rotor.name}' has {slots} pulses per revolution but {len(given)} slot errors.",
+                f"instruments.{rotor.name}.electronics.slot_errors",
+                "Give one value for each slot.",
+            )
+        errors = np.asarray(given, dtype=np.float64)
+        if np.any(np.diff(errors, append=errors[0]) <= -1.0) or np.abs(errors).max() >= 1.0:
+            raise UserError(
+                f"The slot errors of '{rotor.name}' exchange neighbouring slots.",
+                f"instruments.{rotor.name}.electronics.slot_errors",
+                "Give displacements as fractions of the slot width, below one.",
+            )
+    angles: FloatArray = (np.arange(slots) + errors) * (2.0 * np.pi / slots)
+    return angles
+
+
+class PulseCircuit:
+    """Sensor, contact and logger of one rotor; keeps its state between responses.
+
+    Args:
+        name: Name of the rotor.
+        origin: Start of the recording [ns].
+        seed: Of the random losses and bounces.
+    """
+
+    def __init__(self, name: str, origin: int, seed: int) -> None:
+        self._name = name
+        self._origin = origin
+        self._seed = seed
+        self._last = LONG_AGO
+        self._waiting: TimeArray = np.empty(0, dtype=np.int64)
+
+    def edges(self, response: Response) -> TimeArray:
+        """Stamps of the edges that the logger records in a response [ns], in order of time."""
+        movement = response.rotors[self._name]
+        drive = response.drive
+        parts = []
+        for stretch in response.stretches:
+            rotor = stretch.segment.station.instrument(self._name)
+            assert isinstance(rotor, Rotor)
+            here = slice(stretch.first * movement.nodes, stretch.last * movement.nodes + 1)
+            seconds, numbers = _edges_of(
+                movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor)
+            )
+            seconds = seconds + stretch.first * drive.dt
+            times = drive.start_ns + np.rint(seconds * 1e9).astype(np.int64)
+            end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
+            parts.append(self._recorded(rotor, times, numbers, end))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _drawn(self, purpose: str, numbers: npt.NDArray[np.int64]) -> FloatArray:
+        return random_numbers.uniform(self._seed, f"{self._name}/{purpose}", numbers)
+
+    def _recorded(
+        self, rotor: Rotor, times: TimeArray, numbers: npt.NDArray[np.int64], end: int
+    ) -> TimeArray:
+        electronics = rotor.electronics
+        bounces: TimeArray = np.empty(0, dtype=np.int64)
+        if electronics.bounce_probability > 0.0:
+            bouncing = self._drawn("bounce", numbers) < electronics.bounce_probability
+            bounces = times[bouncing] + round(electronics.bounce_delay * 1e9)
+        if electronics.loss_probability > 0.0:
+            times = times[self._drawn("loss", numbers) >= electronics.loss_probability]
+        if bounces.size or self._waiting.size:
+            times = np.sort(np.concatenate((times, bounces, self._waiting)), kind="stable")
+            self._waiting = times[times > end]
+            times = times[times <= end]
+        if electronics.dead_time > 0.0:
+            times = times[_after_dead_time(times, round(electronics.dead_time * 1e9), self._last)]
+        if times.size:
+            self._last = int(times[-1])
+        for outage in rotor.outages:
+            since = (times - self._origin) * 1e-9
+            times = times[(since < outage.start) | (since >= outage.stop)]
+        return stamps(rotor.clock, times, self._origin)
+
+
+def edge_times(response: Response, name: str, seed: int = 0) -> TimeArray:
+    """Stamps of the edges of one rotor in a response that begins a recording's interval.
+
+    Args:
+        response: From `respond`; the recording starts `drive.elapsed` before its first instant.
+        name: Name of the rotor.
+        seed: Of random losses and bounces.
+
+    Returns:
+        [ns], in order of the edges' true times.
+    """
+    drive = response.drive
+    origin = drive.start_ns - round(drive.elapsed * 1e9)
+    return PulseCircuit(name, origin, seed).edges(response)

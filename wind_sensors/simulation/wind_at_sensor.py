@@ -1,0 +1,169 @@
+"""From the earth wind to the wind in an instrument's own axes, with what the site does to it.
+
+The order is the physical one: motion of the mount, downwash, sensor axes, flow around the mount,
+wakes, lean of the axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+from wind_sensors.motion import relative_wind, rotations
+from wind_sensors.motion.platform_errors import true_motion
+from wind_sensors.motion.platform_track import Motion
+from wind_sensors.simulation.drive import Drive
+from wind_sensors.station.model import FlowDistortion, Instrument, Platform, Station, WakeShadow
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Flow:
+    """What an instrument feels, in its own axes (z along the axis of cup or vane).
+
+    Attributes:
+        wind: Wind against the mount [m/s], shape (n, 3).
+        turning: Angular rate of the mount [rad/s], shape (n, 3).
+        gravity: Gravity minus the mount's acceleration [m/s^2], shape (n, 3).
+    """
+
+    wind: FloatArray
+    turning: FloatArray
+    gravity: FloatArray
+
+
+@compiled
+def _scale_by_fourier(wind: FloatArray, c_1: float, s_1: float, c_2: float, s_2: float) -> None:
+    for i in range(wind.shape[0]):
+        x, y = -wind[i, 0], -wind[i, 1]
+        h = np.hypot(x, y)
+        if h > 0.0:
+            c, s = x / h, y / h
+            factor = 1.0 + c_1 * c + s_1 * s + c_2 * (c * c - s * s) + s_2 * 2.0 * c * s
+            for k in range(3):
+                wind[i, k] *= factor
+
+
+@compiled
+def _scale_by_wake(wind: FloatArray, centre: float, depth: float, width: float) -> None:
+    for i in range(wind.shape[0]):
+        away = np.arctan2(-wind[i, 1], -wind[i, 0]) - centre
+        away -= 2.0 * np.pi * np.floor((away + np.pi) / (2.0 * np.pi))
+        factor = 1.0 - depth * np.exp(-0.5 * (away / width) ** 2)
+        for k in range(3):
+            wind[i, k] *= factor
+
+
+def axis_rotation(tilt_deg: tuple[float, float]) -> FloatArray:
+    """Matrix that turns instrument axes into sensor axes when the axis leans; shape (3, 3).
+
+    Args:
+        tilt_deg: Lean of the axis towards the sensor's x and y [deg]; one rotation about the
+            horizontal axis across the lean.
+    """
+    towards_x, towards_y = np.radians(tilt_deg)
+    return rotations.matrix(rotations.from_rotation_vector((-towards_y, towards_x, 0.0)))
+
+
+class WindAtSensors:
+    """The flow at each instrument of a station in one drive; nothing is computed twice.
+
+    Args:
+        station: The station, without changes.
+        drive: What drives it.
+    """
+
+    def __init__(self, station: Station, drive: Drive) -> None:
+        self._station = station
+        self._drive = drive
+        self._platform = station.platform if drive.motion is not None else None
+        self._motion: Motion | None = None
+        if drive.motion is not None:
+            platform = station.platform or Platform()
+            self._platform = platform
+            self._motion = (
+                drive.motion
+                if drive.motion_is_true
+                else true_motion(platform, drive.motion, drive.dt, drive.elapsed)
+            )
+            self._rotation = relative_wind.sensor_rotation(platform)
+        else:
+            heading = np.radians(station.sensor_heading_deg)
+            self._rotation = rotations.matrix(rotations.from_roll_pitch_yaw(0.0, 0.0, heading))
+        self._flows: dict[tuple[object, ...], Flow] = {}
+        self._winds: dict[tuple[object, ...], FloatArray] = {}
+
+    def flow(self, instrument: Instrument, lean: tuple[float, float] = (0.0, 0.0)) -> Flow:
+        """The flow at an instrument.
+
+        Args:
+            instrument: One of the station's.
+            lean: Tilt of what carries the instrument [deg], added to its own.
+        """
+        tilt = (instrument.tilt_deg[0] + lean[0], instrument.tilt_deg[1] + lean[1])
+        key = (
+            instrument.position, instrument.wake_shadows, instrument.flow_distortion, tilt,
+        )  # fmt: skip
+        if key not in self._flows:
+            self._flows[key] = self._computed(instrument, tilt)
+        return self._flows[key]
+
+    def _lever_arm(self, position: tuple[float, float, float]) -> FloatArray:
+        """The instrument's place in platform axes [m]."""
+        assert self._platform is not None
+        arm: FloatArray = np.asarray(self._platform.sensor_position) + self._rotation @ position
+        return arm
+
+    def _in_platform_axes(self, position: tuple[float, float, float]) -> FloatArray:
+        """Wind against the mount in platform axes; on a mast these are ENU."""
+        motion, platform = self._motion, self._platform
+        if motion is None or platform is None:
+            return self._drive.wind
+        key = (position,)
+        if key not in self._winds:
+            felt = np.einsum("nji,nj->ni", motion.to_earth, self._drive.wind)
+            if platform.velocity_share != 0.0:
+                moving = relative_wind.sensor_velocity(motion, self._lever_arm(position))
+                felt = felt - platform.velocity_share * moving
+            if platform.downwash.induced_velocity != 0.0:
+                felt = felt + relative_wind.rotor_downwash(platform.downwash, felt)
+            self._winds[key] = felt
+        return self._winds[key]
+
+    def _computed(self, instrument: Instrument, tilt: tuple[float, float]) -> Flow:
+        wind = self._in_platform_axes(instrument.position)
+        to_platform = self._rotation
+        if instrument.wake_shadows:
+            wind = wind.copy()
+            for wake in instrument.wake_shadows:
+                centre, width = self._wake_centre(wake), float(np.radians(wake.width_deg))
+                _scale_by_wake(wind, centre, wake.depth, width)
+        in_sensor = wind @ to_platform
+        distortion = instrument.flow_distortion
+        if distortion != FlowDistortion():
+            _scale_by_fourier(
+                in_sensor, distortion.cosine_1, distortion.sine_1, distortion.cosine_2,
+                distortion.sine_2,
+            )  # fmt: skip
+        count = wind.shape[0]
+        motion = self._motion
+        turning = np.zeros((count, 3))
+        gravity = np.zeros((count, 3))
+        gravity[:, 2] = -relative_wind.STANDARD_GRAVITY
+        if motion is not None:
+            arm = self._lever_arm(instrument.position)
+            turning = motion.angular_rate @ to_platform
+            gravity = relative_wind.felt_gravity(motion, arm, self._drive.dt) @ to_platform
+        if tilt != (0.0, 0.0):
+            lean = axis_rotation(tilt)
+            in_sensor, turning, gravity = in_sensor @ lean, turning @ lean, gravity @ lean
+        return Flow(in_sensor, turning, gravity)
+
+    def _wake_centre(self, wake: WakeShadow) -> float:
+        """Heading the wake comes from, counter-clockwise from the platform's (or mast's) x."""
+        clockwise = float(np.radians(wake.bearing_from_deg))
+        return -clockwise if self._motion is not None else 0.5 * np.pi - clockwise
