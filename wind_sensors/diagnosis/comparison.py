@@ -1,0 +1,292 @@
+"""A recording beside the simulation of its station: what the diagnosis works on.
+
+`Comparison` holds everything about one recording that does not depend on the station tried:
+the drive, the measured series and statistics, how far the reference can be trusted at each
+frequency, how large the residual's noise is. `Comparison.vector` turns a station into one vector of
+whitened differences, measured minus simulated, in which a healthy station gives white noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.observation import (
+    HARMONICS,
+    LOWEST_BAND_FREQUENCY,
+    NORMALISED_BANDS,
+    SERIES_INTERVAL,
+    Channel,
+    Grid,
+    angle_series,
+    channels_of,
+    interval_statistics,
+    rate_series,
+)
+from wind_sensors.errors import UserError
+from wind_sensors.simulation.drive import Drive, drive_from_recording
+from wind_sensors.simulation.encoder import angle_readings
+from wind_sensors.simulation.pulses import edge_times
+from wind_sensors.simulation.response import Response, respond
+from wind_sensors.simulation.wind_at_sensor import WindAtSensors
+from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.signals import Angles, Pulses, Recording
+
+FloatArray = npt.NDArray[np.float64]
+
+HIGHEST_FREQUENCY = 1.25
+"""Residual series are compared below this frequency [Hz]; above, only spectra are."""
+
+LOW_END = 0.02
+"""Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
+
+SHORTEST = 60.0
+"""A recording needs this much time in common with its reference [s]."""
+
+BANDS = len(NORMALISED_BANDS) - 1
+INTERVALS = 2 + 2 * HARMONICS
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Series and statistics of the signals of one station, simulated or measured.
+
+    Attributes:
+        cosine: Cosine coefficients of each channel's series up to `HIGHEST_FREQUENCY`, by name.
+        series: The series, by channel name: m/s for a rotor, lateral m/s for a vane.
+        statistics: By channel name: log spectra in the normalised bands (nan: band not seen),
+            for rotors followed by the interval statistics.
+    """
+
+    cosine: dict[str, FloatArray]
+    series: dict[str, FloatArray]
+    statistics: dict[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What a residual of one channel is worth at each coefficient.
+
+    Attributes:
+        slope: Share of the simulated coefficient that the instrument is expected to show.
+        deviation: Standard deviation of the residual's noise.
+        statistics_mean: Healthy mean of measured minus simulated statistics.
+        statistics_deviation: Its standard deviation; inf where the statistic is not used.
+    """
+
+    slope: FloatArray
+    deviation: FloatArray
+    statistics_mean: FloatArray
+    statistics_deviation: FloatArray
+
+
+def _smoothed(values: FloatArray, width: int) -> FloatArray:
+    """Running mean with mirrored ends."""
+    width = max(1, min(width, values.size - 1)) | 1
+    half = width // 2
+    padded = np.concatenate((values[half:0:-1], values, values[-2 : -half - 2 : -1]))
+    total = np.concatenate(([0.0], np.cumsum(padded)))
+    return np.asarray((total[width:] - total[:-width]) / width, dtype=np.float64)[: values.size]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One recording, prepared for comparing stations with it.
+
+    Attributes:
+        recording: The recording.
+        station: The station it is compared with at first (its own, or as commissioned).
+        drive: Wind, motion, air.
+        grid: Bins of the series.
+        channels: What is compared.
+        direction: Slow direction the apparent wind comes from, at the bins, continuous [rad].
+        speed: Slow apparent wind speed at the bins [m/s].
+        wind_from: Direction the apparent wind comes from at the bins, continuous [rad].
+        measured: Of the recording.
+    """
+
+    recording: Recording
+    station: Station
+    drive: Drive
+    grid: Grid
+    channels: tuple[Channel, ...]
+    direction: FloatArray
+    speed: FloatArray
+    wind_from: FloatArray
+    measured: Simulated
+    _cache: dict[str, Simulated] = field(default_factory=dict, repr=False)
+
+    @property
+    def coefficients(self) -> int:
+        """Number of cosine coefficients compared in each channel."""
+        return min(self.grid.n, int(2.0 * self.grid.n * self.grid.dt * HIGHEST_FREQUENCY))
+
+    def respond(self, station: Station) -> Response:
+        """The station's instruments in this recording's wind."""
+        return respond(station, self.drive)
+
+    def signals(self, station: Station) -> tuple[dict[str, Pulses], dict[str, Angles]]:
+        """Simulated pulses and readings; readings carry the stamps of the recorded ones."""
+        response = self.respond(station)
+        pulses = {
+            c.instrument: Pulses(edge_times(response, c.instrument))
+            for c in self.channels
+            if c.kind == "rotor_rate"
+        }
+        angles = {}
+        for c in self.channels:
+            if c.kind == "vane_angle":
+                time = self.recording.angles[c.instrument].time
+                angles[c.instrument] = Angles(time, angle_readings(response, c.instrument, time))
+        return pulses, angles
+
+    def simulate(self, station: Station) -> Simulated:
+        """Series and statistics of a station in this recording's wind."""
+        pulses, angles = self.signals(station)
+        return self.observe(pulses, angles)
+
+    def observe(self, pulses: Mapping[str, Pulses], angles: Mapping[str, Angles]) -> Simulated:
+        """Series and statistics of pulses and readings."""
+        cosine: dict[str, FloatArray] = {}
+        series: dict[str, FloatArray] = {}
+        statistics: dict[str, FloatArray] = {}
+        for channel in self.channels:
+            if channel.kind == "rotor_rate":
+                rotor = self.station.instrument(channel.instrument)
+                assert isinstance(rotor, Rotor)
+                values = rate_series(pulses[channel.instrument], rotor, self.grid)
+                intervals = interval_statistics(
+                    pulses[channel.instrument], rotor, self.wind_from, self.grid
+                )
+                full = spectra.to_cosine(values)
+                bands = self._log_spectrum(full, self.grid.dt, channel, 2.2)
+                statistics[channel.name] = np.concatenate((bands, intervals))
+            else:
+                readings = angles[channel.instrument]
+                deviation = angle_series(readings, self.direction, self.grid)
+                values = deviation * self.speed
+                full = spectra.to_cosine(values)
+                statistics[channel.name] = self._vane_spectrum(readings, channel)
+            series[channel.name] = values
+            cosine[channel.name] = full[: self.coefficients]
+        return Simulated(cosine, series, statistics)
+
+    def _vane_spectrum(self, readings: Angles, channel: Channel) -> FloatArray:
+        time = self.grid.seconds(readings.time)
+        if time.size < 16:
+            return np.full(BANDS, np.nan)
+        dt = float(np.median(np.diff(time)))
+        around = np.interp(time, self.grid.centres, self.direction)
+        deviation = np.nan_to_num(np.angle(np.exp(1j * (readings.angle - around))))
+        weighted = deviation * np.interp(time, self.grid.centres, self.speed)
+        return self._log_spectrum(
+            spectra.to_cosine(np.asarray(weighted)), dt, channel, 0.4 / dt
+        )
+
+    def _log_spectrum(
+        self, coefficients: FloatArray, dt: float, channel: Channel, highest: float
+    ) -> FloatArray:
+        """Log mean square of the coefficients in the normalised bands."""
+        mean_speed = float(np.mean(self.speed))
+        frequency = spectra.cosine_frequencies(coefficients.size, dt)
+        edges = NORMALISED_BANDS * mean_speed / (2.0 * np.pi * channel.length)
+        out = np.full(BANDS, np.nan)
+        power = coefficients * coefficients
+        for k in range(BANDS):
+            low, high = max(edges[k], LOWEST_BAND_FREQUENCY), min(edges[k + 1], highest)
+            inside = (frequency >= low) & (frequency < high)
+            if high > 1.1 * low and np.count_nonzero(inside) >= 20:
+                out[k] = np.log(np.mean(power[inside]) + 1e-12)
+        return out
+
+    def vector(self, simulated: Simulated, trust: Mapping[str, Trust]) -> FloatArray:
+        """Whitened differences of all channels, then of all statistics."""
+        parts = []
+        for channel in self.channels:
+            t = trust[channel.name]
+            parts.append(
+                (self.measured.cosine[channel.name] - t.slope * simulated.cosine[channel.name])
+                / t.deviation
+            )
+        for channel in self.channels:
+            t = trust[channel.name]
+            difference = (
+                self.measured.statistics[channel.name]
+                - simulated.statistics[channel.name]
+                - t.statistics_mean
+            )
+            parts.append(np.nan_to_num(difference / t.statistics_deviation))
+        return np.concatenate(parts)
+
+    def residual_series(
+        self, simulated: Simulated, trust: Mapping[str, Trust]
+    ) -> dict[str, FloatArray]:
+        """Measured minus expected series of each channel, below the highest frequency."""
+        out = {}
+        for channel in self.channels:
+            name = channel.name
+            full = np.zeros(self.grid.n)
+            difference = (
+                self.measured.cosine[name] - trust[name].slope * simulated.cosine[name]
+            )
+            full[: difference.size] = difference
+            out[name] = spectra.from_cosine(full)
+        return out
+
+
+def prepare(recording: Recording, station: Station | None = None) -> Comparison:
+    """Prepare a recording for comparison.
+
+    Args:
+        recording: With a reference wind.
+        station: Station to compare with; None: the recording's own.
+
+    Raises:
+        UserError: There is no reference, or too little of anything.
+    """
+    known = recording.station if station is None else station
+    drive = drive_from_recording(recording)
+    seconds = (len(drive) - 1) * drive.dt
+    if seconds < SHORTEST:
+        raise UserError(
+            f"Only {seconds:.0f} s of reference wind: too little to compare anything.",
+            recording.name,
+            f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
+        )
+    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
+    channels = tuple(
+        c
+        for c in channels_of(known)
+        if c.instrument in (recording.pulses if c.kind == "rotor_rate" else recording.angles)
+    )
+    if not channels:
+        raise UserError(
+            "No instrument of the station has signals in the recording.",
+            recording.name,
+            "Check the topics in the station file with `wind info`.",
+        )
+    flow = WindAtSensors(known, drive).flow(known.instrument(channels[0].instrument)).wind
+    at = np.arange(len(drive)) * drive.dt
+    coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
+    speed = np.hypot(flow[:, 0], flow[:, 1])
+    x = np.interp(grid.centres, at, _smoothed(flow[:, 0], int(60.0 / drive.dt)))
+    y = np.interp(grid.centres, at, _smoothed(flow[:, 1], int(60.0 / drive.dt)))
+    slow_direction = np.unwrap(np.arctan2(-y, -x))
+    slow_speed = np.interp(grid.centres, at, _smoothed(speed, int(10.0 / drive.dt)))
+    empty = Simulated({}, {}, {})
+    comparison = Comparison(
+        recording=recording,
+        station=known,
+        drive=drive,
+        grid=grid,
+        channels=channels,
+        direction=slow_direction,
+        speed=np.maximum(slow_speed, 0.5),
+        wind_from=np.interp(grid.centres, at, coming_from),
+        measured=empty,
+    )
+    return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))

@@ -1,0 +1,192 @@
+"""What is compared: series on a common grid and statistics of the raw signals.
+
+The same functions look at a recording and at its simulation, so that whatever they do to the
+signals (binning, interpolation between pulses) they do to both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.station.model import Angle, Cup, Propeller, Rotor, Station
+from wind_sensors.station.signals import Angles, Pulses
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+SERIES_INTERVAL = 0.2
+"""Interval of the compared series [s]."""
+
+NORMALISED_BANDS = np.array([0.12, 0.25, 0.45, 0.8, 1.3, 2.0, 3.2, 5.0])
+"""Edges of the spectral bands in k times the instrument's length."""
+
+LOWEST_BAND_FREQUENCY = 0.12
+"""Spectral ratios begin here [Hz]; below, errors of the reference dominate."""
+
+HARMONICS = 2
+"""Harmonics of the pulse intervals within a revolution."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Bins of the compared series: [start, start + dt), ...
+
+    Attributes:
+        start: Recording's clock [ns].
+        dt: [s].
+        n: Number of bins.
+    """
+
+    start: int
+    dt: float
+    n: int
+
+    @property
+    def edges(self) -> FloatArray:
+        """Edges of the bins, seconds since `start`, shape (n + 1,)."""
+        return np.arange(self.n + 1) * self.dt
+
+    @property
+    def centres(self) -> FloatArray:
+        """Middles of the bins, seconds since `start`, shape (n,)."""
+        return (np.arange(self.n) + 0.5) * self.dt
+
+    def seconds(self, time: TimeArray) -> FloatArray:
+        """Seconds since `start`."""
+        return np.asarray((time - self.start) * 1e-9, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One compared quantity.
+
+    Attributes:
+        name: E.g. `cup/rotor_rate`, `vane/vane_angle`.
+        instrument: Name of the instrument.
+        kind: Rotor rate (as wind speed, m/s) or vane angle (rad).
+        length: Length constant of the instrument's response [m].
+    """
+
+    name: str
+    instrument: str
+    kind: Literal["rotor_rate", "vane_angle"]
+    length: float
+
+
+def channels_of(station: Station) -> tuple[Channel, ...]:
+    """The compared channels of a station, rotors first."""
+    rotors = [
+        Channel(f"{i.name}/rotor_rate", i.name, "rotor_rate", i.distance_constant)
+        for i in station.instruments
+        if isinstance(i, Rotor)
+    ]
+    vanes = [
+        Channel(f"{i.name}/vane_angle", i.name, "vane_angle", i.distance_constant)
+        for i in station.instruments
+        if isinstance(i, Angle)
+    ]
+    return (*rotors, *vanes)
+
+
+def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArray:
+    """Wind speed that the turns within each bin mean, l times rotor rate [m/s], shape (n,).
+
+    The rotor is taken to turn evenly between two pulses; before the first and after the last it
+    stands.
+    """
+    time = grid.seconds(pulses.time)
+    if time.size < 2:
+        return np.zeros(grid.n)
+    if pulses.turns is not None:
+        turns = np.asarray(pulses.turns, dtype=np.float64)
+    else:
+        turns = np.arange(time.size) / rotor.pulses_per_revolution
+    if np.any(np.diff(time) < 0.0):
+        order = np.argsort(time, kind="stable")
+        time, turns = time[order], np.sort(turns)
+    at = np.interp(grid.edges, time, turns)
+    return np.asarray(
+        np.diff(at) * (2.0 * np.pi * rotor.calibration_distance / grid.dt), dtype=np.float64
+    )
+
+
+def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
+    """Mean reading in each bin, as the deviation from a slow heading [rad], shape (n,).
+
+    Args:
+        angles: Readings.
+        around: Slow heading at the bins' centres [rad, continuous], shape (n,).
+        grid: Bins.
+
+    Returns:
+        Deviations within (-pi, pi], continued where a bin holds no reading.
+    """
+    time = grid.seconds(angles.time)
+    usable = np.isfinite(angles.angle)
+    time, reading = time[usable], angles.angle[usable]
+    index = np.floor(time / grid.dt).astype(np.intp)
+    inside = (index >= 0) & (index < grid.n)
+    index, reading = index[inside], reading[inside]
+    deviation = reading - around[index]
+    c = np.bincount(index, np.cos(deviation), grid.n)
+    s = np.bincount(index, np.sin(deviation), grid.n)
+    filled = (c != 0.0) | (s != 0.0)
+    if not filled.any():
+        return np.zeros(grid.n)
+    mean = np.arctan2(s, c)
+    if not filled.all():
+        mean = np.interp(np.arange(grid.n), np.flatnonzero(filled), mean[filled])
+    return np.asarray(mean, dtype=np.float64)
+
+
+def interval_statistics(
+    pulses: Pulses, rotor: Cup | Propeller, direction: FloatArray, grid: Grid
+) -> FloatArray:
+    """How the pulse intervals are distributed within a revolution, whatever the wind.
+
+    Args:
+        pulses: Edges.
+        rotor: The rotor.
+        direction: Direction of the wind in the plane of rotation at the bins' centres [rad].
+        grid: Bins of `direction`.
+
+    Returns:
+        Share of intervals over 1.6 and under 0.4 times their neighbourhood's mean, then for each
+        harmonic of the revolution the amplitude of the relative interval locked to the slot and
+        locked to the wind's direction (0 where the pulses are too few to tell).
+    """
+    out = np.zeros(2 + 2 * HARMONICS)
+    time = grid.seconds(pulses.time)
+    slots = rotor.pulses_per_revolution
+    if time.size < 200:
+        return out
+    interval = np.diff(time)
+    window = max(5, 2 * (slots // 2) + 1) if slots > 1 else 5
+    kernel = np.full(window, 1.0 / window)
+    local = np.convolve(interval, kernel, mode="same")
+    relative = interval / np.maximum(local, 1e-9)
+    core = relative[window:-window]
+    out[0] = np.mean(core > 1.6)
+    out[1] = np.mean(core < 0.4)
+    if slots < 3:
+        return out
+    total = np.concatenate(([0.0], np.cumsum(interval)))
+    revolution = (total[slots:] - total[:-slots]) / slots
+    first = slots // 2
+    deviation = np.clip(interval[first : first + revolution.size] / revolution - 1.0, -0.8, 0.8)
+    slot = np.arange(first, first + revolution.size)
+    middle = 0.5 * (time[1:] + time[:-1])[first : first + revolution.size]
+    heading = np.interp(middle, grid.centres, direction)
+    for k in range(HARMONICS):
+        harmonic = k + 1
+        if 2 * harmonic > slots - 1:
+            continue
+        turned = harmonic * (2.0 * np.pi / slots) * slot
+        out[2 + 2 * k] = 2.0 * abs(np.mean(deviation * np.exp(-1j * turned)))
+        out[3 + 2 * k] = 2.0 * abs(np.mean(deviation * np.exp(-1j * (turned - harmonic * heading))))
+    return out
