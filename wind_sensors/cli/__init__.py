@@ -1,1 +1,1 @@
-"""The `wind` command: one module for each subcommand."""
+"""The command `wind`; nobody imports this."""

@@ -2,5 +2,6 @@
 
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.recordings.station_files import load_station
+from wind_sensors.recordings.writing import write_recording
 
-__all__ = ["load_station", "read_recording"]
+__all__ = ["load_station", "read_recording", "write_recording"]

@@ -36,7 +36,7 @@ class _FieldAbsent(Exception):
     """The message ends before the field, or its array is shorter than the index."""
 
 
-class _Place(NamedTuple):
+class Place(NamedTuple):
     """Where a field lies: byte offset, NumPy type code, number of items of an array."""
 
     offset: int
@@ -58,13 +58,13 @@ class _Walk:
     position: int = _ENCAPSULATION
     lengths: list[tuple[int, int]] = field(default_factory=list)
 
-    def find(self, node: Any, path: FieldPath) -> _Place:
+    def find(self, node: Any, path: FieldPath) -> Place:
         """Place of the field at `path` below `node`, which starts at the position."""
         kind, detail = node
         if kind == Nodetype.BASE:
             code = _CODES[detail[0]]
             self._align(code)
-            return _Place(self.position, code, 1)
+            return Place(self.position, code, 1)
         if kind == Nodetype.NAME:
             for name, child in self.types.fielddefs[detail][1]:
                 if name == path[0]:
@@ -77,7 +77,7 @@ class _Walk:
             code = _CODES[child[1][0]]
             if count:
                 self._align(code)
-            return _Place(self.position, code, count)
+            return Place(self.position, code, count)
         index = int(path[0])
         if index >= count:
             raise _FieldAbsent
@@ -158,6 +158,14 @@ def leaf(types: Typestore, message_type: str, path: FieldPath) -> str:
     if kind == Nodetype.NAME:
         return str(detail)
     return f"{detail[0][1][0] if detail[0][0] == Nodetype.BASE else detail[0][1]}[]"
+
+
+def place_of(data: bytes, types: Typestore, message_type: str, path: FieldPath) -> Place | None:
+    """Where a field lies in one serialised message; None where the message has no such field."""
+    try:
+        return _Walk(types, data, _order(data)).find((Nodetype.NAME, message_type), path)
+    except _FieldAbsent:
+        return None
 
 
 def columns(
@@ -244,7 +252,7 @@ def _fill(
         first = matrix[0].tobytes()
         walk = _Walk(types, first, _order(first))
         try:
-            place: _Place | None = walk.find((Nodetype.NAME, message_type), path)
+            place: Place | None = walk.find((Nodetype.NAME, message_type), path)
         except _FieldAbsent:
             place = None
         same = np.ones(len(members), dtype=bool)

@@ -12,6 +12,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
 from wind_sensors.recordings.fields import batches, columns, leaf, stamps
 from wind_sensors.recordings.platform import platform_states
+from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
 from wind_sensors.recordings.station_files import load_station
 from wind_sensors.station.inputs import (
     FieldPath,
@@ -37,7 +38,6 @@ from wind_sensors.station.signals import (
 
 STATION_FILE = "recording.yaml"
 BAG_FOLDER = "bag"
-TRUTH_TOPIC = "/truth/wind"
 Mask = npt.NDArray[np.bool_]
 
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Vane
-from wind_sensors.station.signals import FloatArray
+from wind_sensors.station.signals import FloatArray, TimeArray
 
 Signal = Literal[
     "pulses", "angle", "wind", "temperature", "pressure", "odometry", "imu", "twist"
 ]
 FieldPath = tuple[str | int, ...]
-Meaning = Literal["edge", "edges", "count", "angle", "frequency", "value"]
+Meaning = Literal["", "edge", "edges", "count", "angle", "frequency", "value"]
 
 DEFAULT_TYPES: dict[Signal, str] = {
     "pulses": "std_msgs/msg/Header",
@@ -73,14 +73,15 @@ def resolved(source: Input, signal: Signal) -> Input:
         signal: What the input delivers.
 
     Returns:
-        The same input without empty type and meaning. For a rotor, `meaning: value` is kept only
-        where the file says so; the default follows from the type: edges for Header, TimeReference
-        and Int64MultiArray, an angle for JointState, a frequency for floats, a count for the rest.
+        The same input without empty type and meaning. A rotor's meaning follows from the type:
+        edges for Header, TimeReference and Int64MultiArray, an angle for JointState, a frequency
+        for floats, a count for the rest. Every other signal is a value.
     """
     message_type = full_type(source.type) if source.type else DEFAULT_TYPES[signal]
     meaning: Meaning = source.meaning
-    if signal == "pulses" and "meaning" not in source.model_fields_set:
-        meaning = _ROTOR_MEANINGS.get(message_type, "count")
+    if not meaning:
+        by_type = _ROTOR_MEANINGS.get(message_type, "count")
+        meaning = by_type if signal == "pulses" else "value"
     return source.model_copy(
         update={
             "type": message_type,
@@ -151,6 +152,16 @@ def angles_from_raw(source: Input, raw: FloatArray) -> FloatArray:
     borders = 0.5 * (table[1:, 0] + table[:-1, 0])
     angle = np.radians(table[np.searchsorted(borders, raw), 1])
     return np.where(np.isfinite(raw), angle, np.nan)
+
+
+def raw_from_angles(source: Input, angle: FloatArray) -> FloatArray:
+    """The field that `angles_from_raw` turns into these angles (the nearest step of a table)."""
+    if not source.steps:
+        return np.asarray((angle - source.offset) / source.scale, dtype=np.float64)
+    table = np.asarray(source.steps, dtype=np.float64)
+    apart = np.angle(np.exp(1j * (angle[:, None] - np.radians(table[:, 1]))))
+    nearest = np.argmin(np.abs(apart), axis=1)
+    return np.asarray(table[nearest, 0], dtype=np.float64)
 
 
 class TurnReading(NamedTuple):
@@ -249,6 +260,47 @@ def turns_from_raw(
         turns.append(float("nan") if reading is None else reading.turns)
         restarts += reading is not None and reading.restarted
     return np.asarray(turns, dtype=np.float64), restarts
+
+
+def raw_from_turns(
+    source: Input, rotor: Cup | Propeller, time: TimeArray, turns: FloatArray
+) -> FloatArray:
+    """The field that `TurnCounter` turns into these revolutions.
+
+    Args:
+        source: Resolved input of the rotor; `meaning` is count, angle, frequency or value.
+        rotor: The rotor.
+        time: Stamps [ns], shape (n,).
+        turns: Revolutions at the stamps, shape (n,).
+
+    Returns:
+        Shape (n,); counts and angles wrapped at the input's modulus, rates as the mean since the
+        stamp before (zero at the first one).
+    """
+    if source.meaning == "count":
+        value = np.rint(turns * rotor.pulses_per_revolution)
+    elif source.meaning == "angle":
+        value = turns * 2.0 * np.pi
+    else:
+        seconds = np.diff(time, prepend=time[:1]) * 1e-9
+        steps = np.diff(turns, prepend=turns[:1])
+        rate = np.divide(steps, seconds, out=np.zeros(len(turns)), where=seconds > 0.0)
+        if source.meaning == "frequency":
+            value = rate * rotor.pulses_per_revolution
+        else:
+            value = _indicated_speed(rotor, 2.0 * np.pi * rate)
+    raw = (value - source.offset) / source.scale
+    return np.asarray(raw if source.modulus is None else np.mod(raw, source.modulus))
+
+
+def _indicated_speed(rotor: Cup | Propeller, spin: FloatArray) -> FloatArray:
+    """Speed by the calibration at a rotation rate [rad/s]; zero for a rotor that stands."""
+    run = rotor.calibration_distance * spin
+    if isinstance(rotor, Cup):
+        speed = run + rotor.starting_speed
+    else:
+        speed = 0.5 * (run + np.sqrt(run**2 + 4.0 * rotor.stall_speed**2))
+    return np.where(spin > 0.0, speed, 0.0)
 
 
 def angle_inputs(vane: Angle) -> dict[str, Input]:

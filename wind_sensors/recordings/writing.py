@@ -1,0 +1,121 @@
+"""Recordings on disk: `recording.yaml` and a compressed bag."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from wind_sensors.errors import UserError
+from wind_sensors.estimation.outputs import ProcessedRecording
+from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.estimate_topics import estimate_topics
+from wind_sensors.recordings.raw_topics import raw_topics
+from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
+from wind_sensors.recordings.serialising import TopicMessages
+from wind_sensors.station.signals import Recording
+from wind_sensors.station.writing import station_to_yaml
+
+
+def write_recording(
+    folder: str | Path,
+    recording: Recording,
+    *,
+    outputs: ProcessedRecording | Sequence[TopicMessages] = (),
+    force: bool = False,
+) -> Path:
+    """Write a recording as a folder with `recording.yaml` and `bag/` (mcap, zstd).
+
+    Args:
+        folder: Where to.
+        recording: Station and signals; the signals go to the topics that the station names, the
+            truth to `/truth/wind`.
+        outputs: What an estimator found, or further messages.
+        force: Replace a recording that is there.
+
+    Returns:
+        The folder.
+
+    Raises:
+        UserError: Something is there already, cannot be written, or a signal cannot be expressed
+            by the type that the station names.
+    """
+    types = typestore()
+    topics = raw_topics(recording, types)
+    if isinstance(outputs, ProcessedRecording):
+        topics += estimate_topics(outputs, types)
+    else:
+        topics += outputs
+    return write_topics(folder, station_to_yaml(recording.station), topics, force=force)
+
+
+def write_topics(
+    folder: str | Path, station_text: str, topics: Sequence[TopicMessages], *, force: bool = False
+) -> Path:
+    """Write serialised messages and the text of their station file as a recording.
+
+    Raises:
+        UserError: Something is there already, or the folder cannot be written.
+    """
+    target = Path(folder)
+    clear_target(target, force=force)
+    partial = target.with_name(f".{target.name}.partial")
+    try:
+        if partial.exists():
+            shutil.rmtree(partial)
+        partial.mkdir(parents=True)
+        (partial / STATION_FILE).write_text(station_text, encoding="utf-8")
+        _write_bag(partial / BAG_FOLDER, topics)
+        partial.rename(target)
+    except OSError as problem:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise UserError(
+            f"the recording cannot be written ({problem.strerror}).",
+            str(folder),
+            "Choose another place with -o.",
+        ) from None
+    return target
+
+
+def clear_target(target: Path, *, force: bool) -> None:
+    """Make way for a recording.
+
+    Raises:
+        UserError: Something is there and `force` is not given, or it is not a recording.
+    """
+    if not target.exists():
+        return
+    if not force:
+        raise UserError(
+            "this exists already.", str(target), "Choose another place with -o, or add --force."
+        )
+    recorded = (target / STATION_FILE).exists() or (target / "metadata.yaml").exists()
+    if not target.is_dir() or (any(target.iterdir()) and not recorded):
+        raise UserError(
+            "this is not a recording, so --force does not remove it.",
+            str(target),
+            "Choose another place with -o.",
+        )
+    shutil.rmtree(target)
+
+
+def _write_bag(path: Path, topics: Sequence[TopicMessages]) -> None:
+    types = typestore()
+    filled = [topic for topic in topics if len(topic.raw)]
+    time = np.concatenate([np.empty(0, dtype=np.int64), *(topic.time for topic in filled)])
+    owner = np.repeat(np.arange(len(filled)), [len(topic.raw) for topic in filled])
+    index = np.concatenate([np.empty(0, dtype=np.int64), *(np.arange(len(t.raw)) for t in filled)])
+    order = np.argsort(time, kind="stable")
+    writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with writer:
+        connections = [
+            writer.add_connection(topic.topic, topic.message_type, typestore=types)
+            for topic in filled
+        ]
+        columns = (part[order].tolist() for part in (owner, index, time))
+        for who, which, when in zip(*columns, strict=True):
+            writer.write(connections[who], when, filled[who].raw[which])
