@@ -1,7 +1,7 @@
 """From the earth wind to the wind in an instrument's own axes, with what the site does to it.
 
-The order is the physical one: motion of the mount, downwash, sensor axes, flow around the mount,
-wakes, lean of the axis.
+The order is the physical one: motion of the mount, downwash, sensor axes, wakes, flow around the
+mount, lean of the axis.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from wind_sensors.motion import relative_wind, rotations
 from wind_sensors.motion.platform_errors import true_motion
 from wind_sensors.motion.platform_track import Motion
 from wind_sensors.simulation.drive import Drive
-from wind_sensors.station.model import FlowDistortion, Instrument, Platform, Station, WakeShadow
+from wind_sensors.station.model import FlowDistortion, Instrument, Platform, Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -137,12 +137,10 @@ class WindAtSensors:
     def _computed(self, instrument: Instrument, tilt: tuple[float, float]) -> Flow:
         wind = self._in_platform_axes(instrument.position)
         to_platform = self._rotation
-        if instrument.wake_shadows:
-            wind = wind.copy()
-            for wake in instrument.wake_shadows:
-                centre, width = self._wake_centre(wake), float(np.radians(wake.width_deg))
-                _scale_by_wake(wind, centre, wake.depth, width)
         in_sensor = wind @ to_platform
+        for wake in instrument.wake_shadows:
+            centre, width = np.radians((wake.bearing_from_deg, wake.width_deg))
+            _scale_by_wake(in_sensor, float(centre), wake.depth, float(width))
         distortion = instrument.flow_distortion
         if distortion != FlowDistortion():
             _scale_by_fourier(
@@ -162,8 +160,3 @@ class WindAtSensors:
             lean = axis_rotation(tilt)
             in_sensor, turning, gravity = in_sensor @ lean, turning @ lean, gravity @ lean
         return Flow(in_sensor, turning, gravity)
-
-    def _wake_centre(self, wake: WakeShadow) -> float:
-        """Heading the wake comes from, counter-clockwise from the platform's (or mast's) x."""
-        clockwise = float(np.radians(wake.bearing_from_deg))
-        return -clockwise if self._motion is not None else 0.5 * np.pi - clockwise

@@ -55,8 +55,8 @@ class WakeShadow(Entry):
     """Wind deficit behind an obstacle, Gaussian in the wind's direction."""
 
     bearing_from_deg: float
-    """Direction the wind comes from when the sensor is in the middle of the wake: clockwise from
-    north on a mast, clockwise from the bow of the apparent wind on a platform."""
+    """Direction the (apparent) wind comes from when the sensor is in the middle of the wake,
+    counter-clockwise from the sensor's x axis, as a vane's heading."""
     depth: float = Field(ge=-1.0, le=1.0)
     """Relative loss of speed in the middle (negative: speed-up)."""
     width_deg: Positive
