@@ -1,0 +1,178 @@
+"""Start, spin and stop: the one helper behind every executable and `wind` command that uses rclpy.
+
+Nothing heavy is imported at module level, so that an interrupt is answered with exit status 0 from
+the first moment, even while the libraries are still loading.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from enum import Enum, auto
+from importlib import import_module
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from wind_sensors.errors import UserError
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+    from rclpy.executors import Executor
+    from rclpy.node import Node
+
+_WAKE_UP_PERIOD = 0.5
+
+
+class _Stopped(BaseException):
+    """A stop signal arrived while the nodes were being built."""
+
+
+class _Phase(Enum):
+    """What a stop signal means at present."""
+
+    LOADING = auto()
+    BUILDING = auto()
+    RUNNING = auto()
+
+
+class _StopSignals:
+    """One handler for the whole life of the process.
+
+    It is installed before rclpy's, which calls it; installing another one later would replace
+    rclpy's. Hence a phase instead of several handlers.
+    """
+
+    def __init__(self) -> None:
+        self.phase = _Phase.LOADING
+        self._installed = False
+
+    def install(self) -> None:
+        """Answer SIGINT and SIGTERM; to be called from the main thread, before rclpy.init."""
+        if not self._installed:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, self._answer)
+            self._installed = True
+
+    def _answer(self, number: int, frame: FrameType | None) -> None:
+        if self.phase is _Phase.LOADING:
+            # Nothing has been opened yet, so there is nothing to close.
+            os._exit(0)
+        if self.phase is _Phase.BUILDING:
+            raise _Stopped
+        # While running, rclpy has shut its context down and the spinning loop sees that.
+
+
+_stop_signals = _StopSignals()
+
+
+def execute(target: str, arguments: Sequence[str] | None = None) -> int:
+    """Run one executable: import it, build its nodes, spin until told to stop.
+
+    Args:
+        target: `module:function`; the function takes the command line without the program's name
+            and returns the nodes to spin. It may print and raise SystemExit (for `--help`).
+        arguments: Command line without the program's name; None: the process's own.
+
+    Returns:
+        Exit status: 0 after SIGINT or SIGTERM at any moment, 2 after a mistake of the user.
+    """
+    _stop_signals.install()
+    module, _, function = target.partition(":")
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    build: Callable[[list[str]], Sequence[Node]] = getattr(import_module(module), function)
+    return run(lambda: build(given), given)
+
+
+def run(
+    build: Callable[[], Sequence[Node]],
+    arguments: Sequence[str] | None = None,
+    *,
+    until: Callable[[], bool] | None = None,
+) -> int:
+    """Initialise rclpy, build nodes, spin them in one executor, and clean up.
+
+    SIGINT (also twice, as under a launcher) and SIGTERM end it with status 0, whether the nodes
+    are being built, spinning or closing. Call it from the main thread.
+
+    Args:
+        build: Makes the nodes; called after `rclpy.init`.
+        arguments: Command line that may hold `--ros-args`.
+        until: Asked after each batch of callbacks, at least twice a second; True ends the run.
+
+    Returns:
+        Exit status: 0, or 2 after a mistake of the user.
+    """
+    import rclpy
+    from rclpy.exceptions import ParameterException
+    from rclpy.executors import ExternalShutdownException
+
+    nodes: list[Node] = []
+    executor: Executor | None = None
+    _stop_signals.install()
+    try:
+        _initialise(arguments)
+        _stop_signals.phase = _Phase.BUILDING
+        nodes.extend(build())
+        executor = make_executor()
+        for node in nodes:
+            executor.add_node(node)
+        _stop_signals.phase = _Phase.RUNNING
+        while rclpy.ok() and not (until is not None and until()):
+            executor.spin_once(timeout_sec=_WAKE_UP_PERIOD)
+    except (_Stopped, KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (UserError, ParameterException) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except Exception as error:
+        if rclpy.ok() or not _is_consequence_of_shutdown(error):
+            raise
+    finally:
+        _stop_signals.phase = _Phase.RUNNING
+        if executor is not None:
+            executor.shutdown()
+        for node in reversed(nodes):
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _initialise(arguments: Sequence[str] | None) -> None:
+    import rclpy
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+
+    try:
+        rclpy.init(args=None if arguments is None else list(arguments))
+    except (
+        rclpy_implementation.RCLError,
+        rclpy_implementation.RCLInvalidROSArgsError,
+        rclpy_implementation.UnknownROSArgsError,
+    ) as error:
+        raise UserError(
+            "The arguments after --ros-args cannot be understood.",
+            remedy=f"rcl says: {str(error).splitlines()[0]}",
+        ) from error
+
+
+def _is_consequence_of_shutdown(error: Exception) -> bool:
+    """Whether rclpy raises such an error when its context ends under a running call."""
+    from rclpy.exceptions import InvalidHandle, NotInitializedException
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+
+    return isinstance(
+        error, (rclpy_implementation.RCLError, InvalidHandle, NotInitializedException)
+    )
+
+
+def make_executor(context: Context | None = None) -> Executor:
+    """The fastest executor of the installed rclpy: events where it has them, else one thread."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    try:
+        events: Any = import_module("rclpy.experimental")
+    except ImportError:
+        return SingleThreadedExecutor(context=context)
+    executor: Executor = events.EventsExecutor(context=context)
+    return executor

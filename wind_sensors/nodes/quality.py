@@ -1,0 +1,73 @@
+"""Quality of service: raw inputs best effort and deep, outputs reliable; every one overridable."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rclpy.qos import QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+    from rclpy.publisher import Publisher
+    from rclpy.subscription import Subscription
+
+INPUT_DEPTH = 1000
+"""Messages kept for a slow reader: half a minute of a fast cup."""
+
+OUTPUT_DEPTH = 10
+
+
+def input_quality(*, reliable: bool = False, depth: int = INPUT_DEPTH) -> QoSProfile:
+    """Quality of a raw input.
+
+    Args:
+        reliable: True asks publishers to send lost messages again; it does not match a
+            best-effort publisher.
+        depth: Messages kept.
+    """
+    reliability = QoSReliabilityPolicy.RELIABLE if reliable else QoSReliabilityPolicy.BEST_EFFORT
+    return QoSProfile(
+        history=QoSHistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability
+    )
+
+
+def output_quality(depth: int = OUTPUT_DEPTH) -> QoSProfile:
+    """Quality of an output: reliable, the last ones kept."""
+    return QoSProfile(
+        history=QoSHistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=QoSReliabilityPolicy.RELIABLE,
+    )
+
+
+def subscribe(
+    node: Node,
+    message_type: type[Any],
+    topic: str,
+    callback: Callable[[Any], None],
+    quality: QoSProfile,
+    *,
+    raw: bool = False,
+) -> Subscription:
+    """Subscribe, with `qos_overrides.<topic>.subscription.*` parameters."""
+    return node.create_subscription(
+        message_type,
+        topic,
+        callback,
+        quality,
+        qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        raw=raw,
+    )
+
+
+def advertise(node: Node, message_type: type[Any], topic: str, quality: QoSProfile) -> Publisher:
+    """Publish, with `qos_overrides.<topic>.publisher.*` parameters."""
+    return node.create_publisher(
+        message_type,
+        topic,
+        quality,
+        qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+    )
