@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
@@ -11,6 +12,9 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from wind_sensors.errors import UserError
+from wind_sensors.recordings.salvage import salvage
+
+_SUFFIXES = (".mcap", ".db3")
 
 
 @dataclass
@@ -42,14 +46,23 @@ class BagContent:
     types: Typestore
     notes: list[str] = field(default_factory=list)
 
+    def topic(self, name: str, message_type: str, definition: MessageDefinition) -> TopicData:
+        """The data of a topic, new where there is none; its type becomes known."""
+        data = self.topics.get(name)
+        if data is None:
+            data = self.topics[name] = TopicData(message_type)
+            _register(self.types, message_type, definition)
+        return data
 
+
+@lru_cache(maxsize=1)
 def typestore() -> Typestore:
-    """Message definitions of the current ROS 2 distribution."""
+    """Message definitions of the current ROS 2 distribution; not to be added to."""
     return get_typestore(Stores.ROS2_JAZZY)
 
 
 def read_bag(path: Path) -> BagContent:
-    """All messages of a bag.
+    """All messages of a bag, or those that are left of a damaged one.
 
     Args:
         path: Bag folder or a single .mcap or .db3 file.
@@ -57,26 +70,56 @@ def read_bag(path: Path) -> BagContent:
     Raises:
         UserError: Nothing can be read.
     """
-    types = typestore()
-    topics: dict[str, TopicData] = {}
     try:
-        with Reader(path) as reader:
-            for connection in reader.connections:
-                topics[connection.topic] = TopicData(connection.msgtype)
-                _register(types, connection.msgtype, connection.msgdef)
-            appenders = {
-                c.id: (topics[c.topic].log_time.append, topics[c.topic].raw.append)
-                for c in reader.connections
-            }
-            for connection, time, data in reader.messages():
-                add_time, add_raw = appenders[connection.id]
-                add_time(time)
-                add_raw(data)
+        return _read(path)
     except Exception as problem:
+        # A bag can be broken in any way; what its reader raises then is not specified.
+        content = _salvaged(path, problem)
+    if not any(data.raw for data in content.topics.values()):
+        reason = content.notes[0] if content.notes else "it holds no messages"
         raise UserError(
-            f"the bag cannot be read ({problem}).", str(path), "Give a ROS 2 bag (mcap or sqlite3)."
-        ) from problem
-    return BagContent(topics, types)
+            f"the bag cannot be read: {reason}.",
+            str(path),
+            "Give a ROS 2 bag: a folder with metadata.yaml, or a .mcap or .db3 file.",
+        )
+    return content
+
+
+def _read(path: Path) -> BagContent:
+    content = BagContent({}, get_typestore(Stores.ROS2_JAZZY))
+    with Reader(path) as reader:
+        appenders = {}
+        for connection in reader.connections:
+            data = content.topic(connection.topic, connection.msgtype, connection.msgdef)
+            appenders[connection.id] = (data.log_time.append, data.raw.append)
+        for connection, time, raw in reader.messages():
+            add_time, add_raw = appenders[connection.id]
+            add_time(time)
+            add_raw(raw)
+    return content
+
+
+def _salvaged(path: Path, problem: Exception) -> BagContent:
+    """What is left of a bag that its reader refuses."""
+    files = [path] if path.is_file() else sorted(p for s in _SUFFIXES for p in path.glob(f"*{s}"))
+    content = BagContent({}, get_typestore(Stores.ROS2_JAZZY))
+    if not files:
+        content.notes.append(f"{problem}".rstrip("."))
+    for file in files:
+        found = salvage(file)
+        for message in sorted(found.messages, key=lambda message: message.time):
+            data = content.topic(message.topic, message.message_type, message.definition)
+            data.log_time.append(message.time)
+            data.raw.append(message.raw)
+        count = len(found.messages)
+        faults = "; ".join(dict.fromkeys(found.faults)) or "the bag has no usable metadata.yaml"
+        if count:
+            times = [message.time for message in found.messages]
+            span = (max(times) - min(times)) * 1e-9
+            content.notes.append(f"{file.name}: {faults}; {count} messages over {span:.1f} s read")
+        else:
+            content.notes.append(f"{file.name}: {faults}")
+    return content
 
 
 def _register(types: Typestore, name: str, definition: MessageDefinition) -> None:
