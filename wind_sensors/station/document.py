@@ -29,13 +29,14 @@ class Document:
     data: Any
     lines: dict[Path, int]
 
+    def line(self, path: Path) -> int:
+        """Line of a path, or of the innermost parent that is in the text."""
+        known = (path[:length] for length in range(len(path), 0, -1))
+        return next((self.lines[part] for part in known if part in self.lines), 1)
+
     def where(self, path: Path) -> str:
-        """`file:line` of a path, or of the innermost parent that is in the text."""
-        for length in range(len(path), -1, -1):
-            line = self.lines.get(path[:length])
-            if line is not None:
-                return f"{self.name}:{line}"
-        return self.name
+        """`file:line` of a path."""
+        return f"{self.name}:{self.line(path)}"
 
 
 def parse(text: str, name: str) -> Document:

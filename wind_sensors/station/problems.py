@@ -15,12 +15,20 @@ class Problem(NamedTuple):
     """One fault of a file."""
 
     where: str
-    key: str
+    path: Path
     what: str
     remedy: str
 
+    @property
+    def key(self) -> str:
+        """The path as people write it: `instruments[0].pulses.topic`."""
+        text = ""
+        for step in self.path:
+            text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+        return text
+
     def __str__(self) -> str:
-        key = f"{self.key}: " if self.key else ""
+        key = f"{self.key}: " if self.path else ""
         return f"{self.where}: {key}{self.what} {self.remedy}".rstrip()
 
 
@@ -60,7 +68,7 @@ def problem_of(error: ErrorDetails, document: Document, given: Any) -> Problem:
     """
     path = plain_path(error["loc"], given)
     what, remedy = _words(error, path, given)
-    return Problem(document.where(path), _shown(path), what, remedy)
+    return Problem(document.where(path), path, what, remedy)
 
 
 def implausible(document: Document, data: Any, path: Path = ()) -> list[Problem]:
@@ -75,7 +83,7 @@ def implausible(document: Document, data: Any, path: Path = ()) -> list[Problem]
             ceiling = CEILINGS[step]
             if abs(value) > ceiling.value:
                 what = f"{value:g} is larger than any instrument's ({ceiling.value:g})."
-                found.append(Problem(document.where(here), _shown(here), what, ceiling.hint))
+                found.append(Problem(document.where(here), here, what, ceiling.hint))
     return found
 
 
@@ -92,13 +100,6 @@ def plain_path(location: tuple[int | str, ...], data: Any) -> Path:
             path.append(step)
             data = data[step] if step < len(data) else None
     return tuple(path)
-
-
-def _shown(path: Path) -> str:
-    text = ""
-    for step in path:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
-    return text
 
 
 def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:

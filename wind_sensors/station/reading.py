@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from wind_sensors.errors import UserError
 from wind_sensors.station.document import Document, Path, parse
@@ -53,6 +54,7 @@ def station_of(document: Document, profiles: Mapping[str, Profile]) -> Station:
         found = [
             _named(problem_of(detail, document, given), detail["loc"], given, profiles)
             for detail in error.errors(include_url=False)
+            if not _follows(detail, given)
         ]
         problems += found
     if station is not None:
@@ -62,11 +64,19 @@ def station_of(document: Document, profiles: Mapping[str, Profile]) -> Station:
     return station
 
 
+def _follows(detail: ErrorDetails, given: dict[str, Any]) -> bool:
+    """Whether a fault is only the consequence of another one that is told already."""
+    if detail["type"] == "union_tag_not_found":
+        # Without its profile an instrument has no kind either.
+        return bool(detail["input"].get("profile"))
+    return detail["type"] == "too_short" and bool(given.get("instruments"))
+
+
 def _error(document: Document, problems: list[Problem]) -> UserError:
+    problems = sorted(problems, key=lambda problem: document.line(problem.path))
     if len(problems) == 1:
         only = problems[0]
-        key = f"{only.key}: " if only.key else ""
-        return UserError(f"{key}{only.what}", only.where, only.remedy)
+        return UserError(only.what, f"{only.where}: {only.key}".rstrip(": "), only.remedy)
     listed = "".join(f"\n  {problem}" for problem in problems)
     return UserError(f"{len(problems)} problems:{listed}", document.name)
 
@@ -90,17 +100,17 @@ def _with_profiles(
         profile = profiles.get(name)
         if profile is None:
             close = get_close_matches(name, profiles, n=1, cutoff=0.4)
-            guess = f"Did you mean '{close[0]}'? " if close else ""
-            remedy = f"{guess}Profiles: {', '.join(sorted(profiles)) or 'none found'}."
+            known = f"Profiles: {', '.join(sorted(profiles)) or 'none found'}."
+            remedy = f"Did you mean '{close[0]}'?" if close else known
             problems.append(
-                Problem(document.where(path), "profile", f"there is no '{name}'.", remedy)
+                Problem(document.where(path), path, f"there is no '{name}'.", remedy)
             )
             filled.append(entry)
             continue
         kind = entry.get("kind", profile.kind)
         if kind != profile.kind:
             what = f"'{name}' is the profile of a {profile.kind}, not of a {kind}."
-            problems.append(Problem(document.where(path), "profile", what, "Choose another one."))
+            problems.append(Problem(document.where(path), path, what, "Choose another one."))
         filled.append({"kind": profile.kind, **profile.constants, **entry})
     data["instruments"] = filled
     return data, problems
@@ -164,7 +174,6 @@ def _change_problems(document: Document, given: Any, station: Station) -> list[P
         except ValidationError as error:
             for detail in error.errors(include_url=False):
                 found = problem_of(detail, document, trial)
-                key = found.key.rsplit(".", maxsplit=1)[-1]
-                place = document.where((*path, key))
-                problems.append(found._replace(where=place, key=f"changes[{index}].set.{key}"))
+                place: Path = (*path, *found.path[-1:])
+                problems.append(found._replace(where=document.where(place), path=place))
     return problems
