@@ -210,7 +210,7 @@ class TurbulenceStream:
             variance_u = np.maximum(self._variances[0], 1e-300)
             from_u = np.sqrt(self._variances[2] / variance_u) * amplitudes[0]
             amplitudes[2] = self._shared * from_u + own * amplitudes[2]
-        block = sum_modes(amplitudes, self._size).T * self._taper[:, None]
+        block: FloatArray = np.asarray(sum_modes(amplitudes, self._size).T * self._taper[:, None])
         self._blocks[index] = block
         return block
 
