@@ -15,8 +15,21 @@ NODES = (
     "monitor_node",
 )
 NUMBERS = ["numpy>=1.24", "scipy>=1.10", "numba>=0.58"]
-FILES = ["rosbags>=0.10.5", "ruamel.yaml>=0.17.21", "pydantic>=2.7"]
+FILES = ["rosbags>=0.11", "ruamel.yaml>=0.17.21", "pydantic>=2.7", "lz4"]
 PEOPLE = ["rich>=12.4", "matplotlib>=3.6"]
+ROS_WHEELS = [
+    f"ros-jazzy-{package}"
+    for package in (
+        "rclpy",
+        "rmw-fastrtps-cpp",
+        "diagnostic-msgs",
+        "geometry-msgs",
+        "nav-msgs",
+        "rosgraph-msgs",
+        "sensor-msgs",
+        "std-msgs",
+    )
+]
 
 
 def share(folder: str, pattern: str) -> tuple[str, list[str]]:
@@ -42,6 +55,7 @@ setup(
     python_requires=">=3.10",
     install_requires=["setuptools", *NUMBERS, *FILES, *PEOPLE],
     extras_require={
+        "ros": ROS_WHEELS,
         "test": ["pytest>=7.0", "hypothesis>=6.70"],
         "dev": ["mypy>=1.10", "ruff>=0.6", "scipy-stubs"],
         "peers": ["pysindy>=1.7", "sysidentpy>=0.3", "scikit-learn>=1.3"],
