@@ -1,0 +1,100 @@
+"""From a station to the constant arrays of the filter."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.estimation.forward import CUP, FIXED_AXIS, ON_VANE, Instruments
+from wind_sensors.motion import rotations
+from wind_sensors.station.model import Bivane, Cup, Instrument, Propeller, Rotor, Station, Vane
+from wind_sensors.station.parameters import rotor_parameters, vane_parameters
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def rotors_of(station: Station) -> tuple[Cup | Propeller, ...]:
+    """Rotors in the station's order."""
+    return tuple(i for i in station.instruments if isinstance(i, (Cup, Propeller)))
+
+
+def vanes_of(station: Station) -> tuple[Vane, ...]:
+    """Vanes in the station's order."""
+    return tuple(i for i in station.instruments if isinstance(i, Vane))
+
+
+def bivanes_of(station: Station) -> tuple[Bivane, ...]:
+    """Bivanes in the station's order."""
+    return tuple(i for i in station.instruments if isinstance(i, Bivane))
+
+
+def sensor_yaw(station: Station) -> float:
+    """Heading of the sensor's x axis against ENU (mast) or the platform's x axis [rad]."""
+    if station.platform is None:
+        return float(np.radians(station.sensor_heading_deg))
+    return float(np.radians(station.platform.sensor_rotation_deg[2]))
+
+
+def _mounting(rotor: Rotor, vanes: tuple[Vane, ...]) -> list[float]:
+    if isinstance(rotor, Propeller) and rotor.mounted_on:
+        carrier = [v.name for v in vanes].index(rotor.mounted_on)
+        row = [ON_VANE, carrier, rotor.distance_to_vane_axis, 0.0, 0.0, 0.0]
+    elif isinstance(rotor, Propeller):
+        axis = np.asarray(rotor.axis if rotor.axis is not None else (1.0, 0.0, 0.0), dtype=float)
+        row = [FIXED_AXIS, 0, 0.0, *(axis / np.linalg.norm(axis))]
+    else:
+        row = [CUP, 0, 0.0, 0.0, 0.0, 0.0]
+    return [float(v) for v in (*row, rotor.reference_density)]
+
+
+def _lean(tilt_deg: tuple[float, float]) -> FloatArray:
+    towards_x, towards_y = np.radians(tilt_deg)
+    return rotations.matrix(rotations.from_rotation_vector((-towards_y, towards_x, 0.0)))
+
+
+def instruments_of(station: Station) -> Instruments:
+    """Constant arrays of all rotors and vanes of a station (without changes)."""
+    rotors, vanes = rotors_of(station), vanes_of(station)
+    every: tuple[Instrument, ...] = (*rotors, *vanes)
+    count = len(every)
+    most = max([len(i.wake_shadows) for i in every], default=0)
+    shadow = np.zeros((count, max(most, 1), 3))
+    shadow[:, :, 2] = 1.0
+    distortion = np.zeros((count, 4))
+    lean = np.zeros((count, 3, 3))
+    plain = np.zeros(count, dtype=np.int64)
+    yaw = sensor_yaw(station)
+    north = 0.5 * np.pi if station.platform is None else 0.0
+    for k, instrument in enumerate(every):
+        for j, wake in enumerate(instrument.wake_shadows):
+            centre = north - np.radians(wake.bearing_from_deg) - yaw
+            shadow[k, j] = centre, wake.depth, np.radians(wake.width_deg)
+        d = instrument.flow_distortion
+        distortion[k] = d.cosine_1, d.sine_1, d.cosine_2, d.sine_2
+        tilt = instrument.tilt_deg
+        if isinstance(instrument, Propeller) and instrument.mounted_on:
+            carrier = next(v for v in vanes if v.name == instrument.mounted_on)
+            tilt = (tilt[0] + carrier.tilt_deg[0], tilt[1] + carrier.tilt_deg[1])
+        lean[k] = _lean(tilt)
+        plain[k] = int(
+            not instrument.wake_shadows and not np.any(distortion[k]) and tilt == (0.0, 0.0)
+        )
+    rotor_rows = np.zeros((len(rotors), 15))
+    tables = np.ones((len(rotors), 181))
+    mounting = np.zeros((len(rotors), 7))
+    for k, rotor in enumerate(rotors):
+        p = rotor_parameters(rotor)
+        rotor_rows[k] = [v for name, v in p._asdict().items() if name != "angular_response"]
+        tables[k] = p.angular_response
+        mounting[k] = _mounting(rotor, vanes)
+    return Instruments(
+        rotor=rotor_rows,
+        response=tables,
+        mounting=mounting,
+        vane=np.array([list(vane_parameters(v)) for v in vanes]).reshape(len(vanes), 7),
+        vane_density=np.array([v.reference_density for v in vanes]),
+        shadow=shadow,
+        distortion=distortion,
+        lean=lean,
+        plain=plain,
+    )

@@ -1,0 +1,261 @@
+"""Compiled forward model of a station over one short interval, with its Jacobian.
+
+The same equations of motion as the simulation (`instruments.dynamics`), arranged for a filter:
+wind at the start and at the end of the interval in ENU, linear between, and the states of all
+instruments: y [m/s] and psi [rad] of each rotor, phi [rad] and its rate [rad/s] of each vane.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+from wind_sensors.instruments.dynamics.rotor import (
+    RotorParameters,
+    advance_rotor,
+    rotor_forcing,
+)
+from wind_sensors.instruments.dynamics.vane import VaneParameters, advance_vane, propeller_axes
+
+FloatArray = npt.NDArray[np.float64]
+
+CUP, ON_VANE, FIXED_AXIS = 0, 1, 2
+
+MOUNT_VELOCITY = 0
+MOUNT_ROTATION = 3
+MOUNT_YAW_RATE = 12
+MOUNT_GRAVITY_X = 13
+MOUNT_GRAVITY_Y = 14
+AIR_DENSITY = 15
+AIR_TEMPERATURE = 16
+VELOCITY_VARIANCE = 17
+ATTITUDE_VARIANCE = 18
+CIRCUMSTANCES = 19
+"""Columns of the circumstances of an instant: velocity of the sensor (ENU), rotation of the sensor
+frame into ENU (by rows), yaw rate, gravity felt along x and y, air, variances of the mount."""
+
+
+class Instruments(NamedTuple):
+    """Constants of all rotors and vanes of a station as arrays.
+
+    Attributes:
+        rotor: `RotorParameters` without the table, shape (rotors, 15).
+        response: Angular response tables, shape (rotors, 181).
+        mounting: Kind, index of the carrying vane, arm [m], axis x, y, z, reference density
+            [kg/m^3]; shape (rotors, 7).
+        vane: `VaneParameters`, shape (vanes, 7).
+        vane_density: Reference densities [kg/m^3], shape (vanes,).
+        shadow: Wake shadows of rotors then vanes: bearing of its middle against x [rad], depth,
+            width [rad]; shape (rotors + vanes, shadows, 3).
+        distortion: cos, sin, cos 2, sin 2 of the speed-up; shape (rotors + vanes, 4).
+        lean: Matrices that turn instrument axes into sensor axes, shape (rotors + vanes, 3, 3).
+        plain: 1 where neither shadow nor distortion nor lean changes the wind.
+    """
+
+    rotor: FloatArray
+    response: FloatArray
+    mounting: FloatArray
+    vane: FloatArray
+    vane_density: FloatArray
+    shadow: FloatArray
+    distortion: FloatArray
+    lean: FloatArray
+    plain: npt.NDArray[np.int64]
+
+
+@compiled
+def rotor_of(s: Instruments, i: int) -> RotorParameters:
+    """Constants of rotor i."""
+    r = s.rotor[i]
+    return RotorParameters(
+        int(r[0]), r[1], r[2], r[3], r[4], r[5], r[6], s.response[i], r[7], r[8], r[9], r[10],
+        r[11], r[12], r[13], r[14],
+    )  # fmt: skip
+
+
+@compiled
+def vane_of(s: Instruments, i: int) -> VaneParameters:
+    """Constants of vane i."""
+    v = s.vane[i]
+    return VaneParameters(v[0], v[1], v[2], v[3], v[4], v[5], v[6])
+
+
+@compiled
+def apparent(wind: FloatArray, c: FloatArray) -> tuple[float, float, float]:
+    """Wind in the sensor frame [m/s] under the circumstances c."""
+    e = wind[0] - c[0]
+    n = wind[1] - c[1]
+    u = wind[2] - c[2]
+    return (
+        c[3] * e + c[6] * n + c[9] * u,
+        c[4] * e + c[7] * n + c[10] * u,
+        c[5] * e + c[8] * n + c[11] * u,
+    )
+
+
+@compiled
+def at_instrument(
+    s: Instruments, which: int, wind: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Wind in the instrument's axes: wake shadow, speed-up, lean of its axis."""
+    if s.plain[which] == 1:
+        return wind
+    x, y, z = wind
+    factor = 1.0
+    bearing = math.atan2(-y, -x)
+    for k in range(s.shadow.shape[1]):
+        depth = s.shadow[which, k, 1]
+        if depth != 0.0:
+            off = bearing - s.shadow[which, k, 0]
+            off -= 2.0 * math.pi * math.floor((off + math.pi) / (2.0 * math.pi))
+            off /= s.shadow[which, k, 2]
+            factor *= 1.0 - depth * math.exp(-0.5 * off * off)
+    d = s.distortion[which]
+    factor *= (
+        1.0
+        + d[0] * math.cos(bearing)
+        + d[1] * math.sin(bearing)
+        + d[2] * math.cos(2.0 * bearing)
+        + d[3] * math.sin(2.0 * bearing)
+    )
+    x *= factor
+    y *= factor
+    z *= factor
+    m = s.lean[which]
+    return (
+        m[0, 0] * x + m[1, 0] * y + m[2, 0] * z,
+        m[0, 1] * x + m[1, 1] * y + m[2, 1] * z,
+        m[0, 2] * x + m[1, 2] * y + m[2, 2] * z,
+    )
+
+
+@compiled
+def rotor_axes(
+    s: Instruments, i: int, wind: tuple[float, float, float], phi: float, air_turn: float
+) -> tuple[float, float, float]:
+    """Axial wind, transverse speed [m/s] and its direction [rad] for rotor i; wind in its axes."""
+    x, y, z = wind
+    kind = int(s.mounting[i, 0])
+    if kind == CUP:
+        return z, math.hypot(x, y), math.atan2(y, x)
+    if kind == ON_VANE:
+        return propeller_axes(x, y, z, phi, air_turn, s.mounting[i, 2])
+    a, b, c = s.mounting[i, 3], s.mounting[i, 4], s.mounting[i, 5]
+    axial = a * x + b * y + c * z
+    p, q, r = x - axial * a, y - axial * b, z - axial * c
+    return axial, math.sqrt(p * p + q * q + r * r), 0.0
+
+
+@compiled
+def forcing_of(
+    s: Instruments, i: int, wind: FloatArray, c: FloatArray, phi: float, air_turn: float
+) -> tuple[float, float]:
+    """Effective forcing A and slope wind B [m/s] of rotor i in an ENU wind."""
+    local = at_instrument(s, i, apparent(wind, c))
+    axial, transverse, lateral = rotor_axes(s, i, local, phi, air_turn)
+    a, b, _ = rotor_forcing(rotor_of(s, i), axial, transverse, lateral)
+    return a, b
+
+
+@compiled
+def advance_station(
+    s: Instruments,
+    wind_0: FloatArray,
+    wind_1: FloatArray,
+    c_0: FloatArray,
+    c_1: FloatArray,
+    state: FloatArray,
+    dt: float,
+    out: FloatArray,
+) -> None:
+    """States of all instruments after dt [s], written to `out`."""
+    rotors = s.rotor.shape[0]
+    vanes = s.vane.shape[0]
+    felt_0 = apparent(wind_0, c_0)
+    felt_1 = apparent(wind_1, c_1)
+    for v in range(vanes):
+        j = 2 * (rotors + v)
+        here_0 = at_instrument(s, rotors + v, felt_0)
+        here_1 = at_instrument(s, rotors + v, felt_1)
+        phi, rate = advance_vane(
+            vane_of(s, v), state[j], state[j + 1], (here_0[0], here_1[0]), (here_0[1], here_1[1]),
+            (c_0[MOUNT_YAW_RATE], c_1[MOUNT_YAW_RATE]),
+            (c_1[MOUNT_GRAVITY_X], c_1[MOUNT_GRAVITY_Y]),
+            c_1[AIR_DENSITY] / s.vane_density[v], dt,
+        )  # fmt: skip
+        out[j] = phi
+        out[j + 1] = rate
+    for i in range(rotors):
+        phi_0 = rate_0 = phi_1 = rate_1 = 0.0
+        if int(s.mounting[i, 0]) == ON_VANE:
+            j = 2 * (rotors + int(s.mounting[i, 1]))
+            phi_0, rate_0, phi_1, rate_1 = state[j], state[j + 1], out[j], out[j + 1]
+        axial_0, transverse_0, lateral_0 = rotor_axes(
+            s, i, at_instrument(s, i, felt_0), phi_0, rate_0 + c_0[MOUNT_YAW_RATE]
+        )
+        axial_1, transverse_1, lateral_1 = rotor_axes(
+            s, i, at_instrument(s, i, felt_1), phi_1, rate_1 + c_1[MOUNT_YAW_RATE]
+        )
+        y, psi = advance_rotor(
+            rotor_of(s, i), state[2 * i], state[2 * i + 1], (axial_0, axial_1),
+            (transverse_0, transverse_1), (lateral_0, lateral_1),
+            c_1[AIR_DENSITY] / s.mounting[i, 6], c_1[AIR_TEMPERATURE], dt,
+        )  # fmt: skip
+        out[2 * i] = y
+        out[2 * i + 1] = psi
+
+
+@compiled
+def advance_with_jacobian(
+    s: Instruments,
+    wind_0: FloatArray,
+    wind_1: FloatArray,
+    c_0: FloatArray,
+    c_1: FloatArray,
+    state: FloatArray,
+    dt: float,
+    out: FloatArray,
+    by_wind_0: FloatArray,
+    by_wind_1: FloatArray,
+    by_state: FloatArray,
+) -> None:
+    """`advance_station` and its derivatives by forward differences.
+
+    Args:
+        by_wind_0, by_wind_1: Filled with d out / d wind, shape (states, 3) each.
+        by_state: Filled with d out / d state, shape (states, states).
+    """
+    count = state.shape[0]
+    advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, out)
+    moved = np.empty(count)
+    step = 1e-4
+    for k in range(3):
+        keep = wind_0[k]
+        wind_0[k] = keep + step
+        advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, moved)
+        wind_0[k] = keep
+        for j in range(count):
+            by_wind_0[j, k] = (moved[j] - out[j]) / step
+        keep = wind_1[k]
+        wind_1[k] = keep + step
+        advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, moved)
+        wind_1[k] = keep
+        for j in range(count):
+            by_wind_1[j, k] = (moved[j] - out[j]) / step
+    rotors = s.rotor.shape[0]
+    for k in range(count):
+        if k < 2 * rotors and k % 2 == 1 and s.rotor[k // 2, 13] == 0.0:
+            for j in range(count):
+                by_state[j, k] = 0.0
+            by_state[k, k] = 1.0
+            continue
+        keep = state[k]
+        state[k] = keep + step
+        advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, moved)
+        state[k] = keep
+        for j in range(count):
+            by_state[j, k] = (moved[j] - out[j]) / step

@@ -1,0 +1,154 @@
+"""The loop over events: prediction, correction, and the smoother at the end of each block."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+from wind_sensors.estimation.filter_kernel import (
+    correct_by_edge,
+    correct_by_reading,
+    correct_by_silence,
+    predict,
+)
+from wind_sensors.estimation.filter_state import EDGE, OUTPUT, READING, FilterState, Ring
+from wind_sensors.estimation.forward import Instruments
+from wind_sensors.estimation.smoother_kernel import smooth
+from wind_sensors.estimation.turbulence_process import WIND_STATES
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_LOSS_NOTICED = 0.002
+"""Share of lost edges from which silence no longer means that the rotor waits."""
+_IN_A_ROW = 3
+"""So many rejected edges in a row are not extra edges: the rotor is faster than believed."""
+
+
+@compiled
+def is_extra_edge(f: FilterState, s: Instruments, r: int, time: int) -> bool:
+    """Whether an edge comes before the rotor can have turned half a slot."""
+    if f.tally[r, 0] == 0 or f.rejected[r] >= _IN_A_ROW:
+        return False
+    since = (time - f.last_edge[r]) * 1e-9
+    width = 2.0 * math.pi / f.slots[r]
+    y = WIND_STATES + 2 * r
+    turned = f.mean[y] * since / (s.rotor[r, 1] * width)
+    unsure = math.sqrt(f.covariance[y, y]) * since / (s.rotor[r, 1] * width)
+    return turned + 3.0 * unsure < 0.5
+
+
+@compiled
+def run(
+    f: FilterState,
+    s: Instruments,
+    ring: Ring,
+    time: IntArray,
+    kind: IntArray,
+    index: IntArray,
+    value: FloatArray,
+    extra: FloatArray,
+    circumstances: FloatArray,
+    stop: int,
+    block: int,
+    lag: int,
+    weight: float,
+    out_time: IntArray,
+    out_states: FloatArray,
+    out_covariance: FloatArray,
+    out_circumstances: FloatArray,
+) -> int:
+    """Process events up to `stop`, a whole number of blocks.
+
+    Args:
+        f, s, ring: Filter, station, steps.
+        time: Of the events, in order [ns].
+        kind: OUTPUT, READING or EDGE.
+        index: Vane or rotor.
+        value: Angle of a reading [rad], turns of an edge or nan.
+        extra: Additional variance of a reading [rad^2].
+        circumstances: Mount and air at the events, shape (n, 19).
+        stop: End of the last block [ns].
+        block: Length of a block [ns].
+        lag: Of the smoother [ns].
+        weight: Weight of a block in running averages.
+        out_time, out_states, out_covariance, out_circumstances: Receive the estimates.
+
+    Returns:
+        Number of estimates.
+    """
+    filled = 0
+    rotors = s.rotor.shape[0]
+    capacity = ring.time.shape[0]
+    end = (f.clock[0] // block + 1) * block
+    n = time.shape[0]
+    i = 0
+    while True:
+        if i >= n or time[i] >= end:
+            if end > stop:
+                break
+            filled = smooth(
+                f, s, ring, end - lag, weight, out_time, out_states, out_covariance,
+                out_circumstances, filled,
+            )  # fmt: skip
+            end += block
+            continue
+        this = kind[i]
+        which = index[i]
+        if this == EDGE:
+            if is_extra_edge(f, s, which, time[i]):
+                f.tally[which, 2] += 1
+                f.rejected[which] += 1
+                i += 1
+                continue
+            f.tally[which, 0] += 1
+            f.rejected[which] = 0
+            if math.isnan(value[i]):
+                f.edge_count[which] += 1
+            else:
+                f.edge_count[which] = int(math.floor(value[i] * f.slots[which] + 0.5))
+            f.last_edge[which] = time[i]
+            if f.edge_count[which] % f.stride[which] != 0:
+                i += 1
+                continue
+        at = f.clock[2] % capacity
+        ring.time[at] = time[i]
+        ring.kind[at] = this
+        ring.index[at] = which
+        ring.slot[at] = -1
+        ring.measured[at] = -1
+        ring.moved[at] = 0
+        dt = (time[i] - f.clock[0]) * 1e-9
+        if dt > 0.0:
+            predict(f, s, ring, at, circumstances[i], dt)
+            f.clock[0] = time[i]
+        if this == READING:
+            correct_by_reading(f, s, ring, at, which, value[i], extra[i])
+        elif this == EDGE:
+            correct_by_edge(f, s, ring, at, which)
+        else:
+            _listen(f, s, ring, at, rotors, which)
+            ring.circumstances[at] = circumstances[i]
+            ring.mean[at] = f.mean
+            ring.covariance[at] = f.covariance
+        f.clock[2] += 1
+        i += 1
+    return filled
+
+
+@compiled
+def _listen(f: FilterState, s: Instruments, ring: Ring, at: int, rotors: int, which: int) -> None:
+    """No edge until now: at output instants one rotor in turn may not have passed its next edge."""
+    if rotors == 0:
+        return
+    r = which % rotors
+    if f.tally[r, 0] == 0:
+        return
+    lost = f.tally[r, 1] / max(f.tally[r, 0], 1)
+    allowance = 1.2 if lost < _LOSS_NOTICED else 4.0
+    width = 2.0 * math.pi / f.slots[r]
+    correct_by_silence(f, ring, at, r, (f.edge_count[r] + allowance) * width)
+    ring.kind[at] = OUTPUT
