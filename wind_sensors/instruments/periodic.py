@@ -80,24 +80,22 @@ def periodic_rate(
         ValueError: If no periodic solution with a positive rate is found (the rotor stops, or the
             gust is not smooth).
     """
-    rate = np.zeros(0)
     for size in _SIZES:
         theta = 2.0 * math.pi * np.arange(size) / size
         a = forcing(theta)
         e = np.zeros(size) if lift is None else lift(theta)
-        rate = _solve(a, e, a4, reduced_frequency)
+        rate, settled = _solve(a, e, a4, reduced_frequency)
         coefficients = np.fft.rfft(rate) / size
         tail = np.max(np.abs(coefficients[-size // 8 :]))
-        if tail < _TAIL * np.max(np.abs(coefficients)):
-            break
-    else:
-        raise ValueError("no smooth periodic response: the rotor stops or the gust has corners")
-    if np.min(rate) <= 0.0:
-        raise ValueError("the rotor stops within the period; the equation no longer holds")
-    return PeriodicRate(coefficients)
+        if settled and tail < _TAIL * np.max(np.abs(coefficients)):
+            return PeriodicRate(coefficients)
+    raise ValueError("no smooth periodic response: the rotor stops or the gust has corners")
 
 
-def _solve(a: FloatArray, e: FloatArray, a4: float, reduced_frequency: float) -> FloatArray:
+def _solve(
+    a: FloatArray, e: FloatArray, a4: float, reduced_frequency: float
+) -> tuple[FloatArray, bool]:
+    """Newton's method from the linear response: the rate, and whether it settled."""
     size = a.size
     derivative = _differentiation_matrix(size)
     orders = np.arange(size // 2 + 1)
@@ -111,9 +109,9 @@ def _solve(a: FloatArray, e: FloatArray, a4: float, reduced_frequency: float) ->
         # A step that would turn the rotor backwards leaves the model's range: shorten it.
         shortest = np.min(np.where(change > 0.0, 0.9 * np.abs(y) / np.maximum(change, 1e-300), 1.0))
         y = y - min(1.0, float(shortest)) * change
-        if np.max(np.abs(change)) < 1e-14 * max(1.0, float(np.max(np.abs(y)))):
-            break
-    return y
+        if np.max(np.abs(change)) < 1e-11 * max(1.0, float(np.max(np.abs(y)))):
+            return y, True
+    return y, False
 
 
 def _differentiation_matrix(size: int) -> FloatArray:
