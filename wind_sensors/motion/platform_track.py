@@ -189,16 +189,18 @@ def _carried_on(motion: Motion, seconds: FloatArray) -> Motion:
     return replace(motion, attitude=attitude, position=motion.position + travelled)
 
 
-def shifted(motion: Motion, dt: float, seconds: npt.ArrayLike) -> Motion:
-    """A regularly sampled motion, each instant read that many seconds later.
+def sampled(motion: Motion, dt: float, seconds: FloatArray) -> Motion:
+    """A regularly sampled motion, read at any instants.
 
     Args:
         motion: At instants 0, dt, 2 dt, ...
         dt: Interval [s].
-        seconds: Shift [s], scalar or shape (n,); reading beyond the ends stays at the ends.
+        seconds: Instants wanted [s], shape (m,); beyond the ends the ends are read.
     """
     count = len(motion)
-    place = np.clip(np.arange(count) + np.asarray(seconds, dtype=np.float64) / dt, 0.0, count - 1.0)
+    place = np.clip(np.asarray(seconds, dtype=np.float64) / dt, 0.0, count - 1.0)
+    nearest = np.rint(place)
+    place = np.where(np.abs(place - nearest) < 1e-7, nearest, place)
     left = np.minimum(place.astype(np.int64), max(count - 2, 0))
     right = np.minimum(left + 1, count - 1)
     fraction = place - left
@@ -214,3 +216,15 @@ def shifted(motion: Motion, dt: float, seconds: npt.ArrayLike) -> Motion:
         angular_rate=between(motion.angular_rate),
         position=between(motion.position),
     )
+
+
+def shifted(motion: Motion, dt: float, seconds: npt.ArrayLike) -> Motion:
+    """A regularly sampled motion, each instant read that many seconds later.
+
+    Args:
+        motion: At instants 0, dt, 2 dt, ...
+        dt: Interval [s].
+        seconds: Shift [s], scalar or shape (n,); beyond the ends the ends are read.
+    """
+    instants = dt * np.arange(len(motion), dtype=np.float64)
+    return sampled(motion, dt, instants + np.asarray(seconds, dtype=np.float64))

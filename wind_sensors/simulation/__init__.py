@@ -10,8 +10,12 @@ from wind_sensors.simulation.response import (
     RotorResponse,
     respond,
 )
+from wind_sensors.simulation.run import SignalStream, simulate
+from wind_sensors.simulation.scenario import Scenario, TransportFaults
+from wind_sensors.simulation.trajectories import CARRIERS, Trajectory
 
 __all__ = [
+    "CARRIERS",
     "AngleEncoder",
     "AngleResponse",
     "Drive",
@@ -19,9 +23,14 @@ __all__ = [
     "Response",
     "ResponseState",
     "RotorResponse",
+    "Scenario",
+    "SignalStream",
+    "Trajectory",
+    "TransportFaults",
     "air_density",
     "angle_readings",
     "drive_from_recording",
     "edge_times",
     "respond",
+    "simulate",
 ]

@@ -71,7 +71,7 @@ class AngleEncoder:
         numbers = self._samples + np.arange(stamped.shape[0], dtype=np.int64)
         done = 0
         for k, stretch in enumerate(response.stretches):
-            vane = stretch.segment.station.instrument(self._name.split("/")[0])
+            vane = stretch.segment.station.instrument(self._name.split("/", maxsplit=1)[0])
             assert isinstance(vane, Angle)
             since = measured_seconds(vane.clock, stamped, self._origin)
             stop = stamped.shape[0]

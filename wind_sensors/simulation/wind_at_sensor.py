@@ -16,7 +16,7 @@ from wind_sensors.motion import relative_wind, rotations
 from wind_sensors.motion.platform_errors import true_motion
 from wind_sensors.motion.platform_track import Motion
 from wind_sensors.simulation.drive import Drive
-from wind_sensors.station.model import FlowDistortion, Instrument, Platform, Station
+from wind_sensors.station.model import Angle, FlowDistortion, Instrument, Platform, Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,7 +28,8 @@ class Flow:
     Attributes:
         wind: Wind against the mount [m/s], shape (n, 3).
         turning: Angular rate of the mount [rad/s], shape (n, 3).
-        gravity: Gravity minus the mount's acceleration [m/s^2], shape (n, 3).
+        gravity: Gravity minus the mount's acceleration [m/s^2], shape (n, 3); zero for instruments
+            in balance.
     """
 
     wind: FloatArray
@@ -105,11 +106,12 @@ class WindAtSensors:
             lean: Tilt of what carries the instrument [deg], added to its own.
         """
         tilt = (instrument.tilt_deg[0] + lean[0], instrument.tilt_deg[1] + lean[1])
+        weighs = isinstance(instrument, Angle) and instrument.imbalance != 0.0
         key = (
-            instrument.position, instrument.wake_shadows, instrument.flow_distortion, tilt,
+            instrument.position, instrument.wake_shadows, instrument.flow_distortion, tilt, weighs,
         )  # fmt: skip
         if key not in self._flows:
-            self._flows[key] = self._computed(instrument, tilt)
+            self._flows[key] = self._computed(instrument, tilt, weighs)
         return self._flows[key]
 
     def _lever_arm(self, position: tuple[float, float, float]) -> FloatArray:
@@ -134,7 +136,7 @@ class WindAtSensors:
             self._winds[key] = felt
         return self._winds[key]
 
-    def _computed(self, instrument: Instrument, tilt: tuple[float, float]) -> Flow:
+    def _computed(self, instrument: Instrument, tilt: tuple[float, float], weighs: bool) -> Flow:
         wind = self._in_platform_axes(instrument.position)
         to_platform = self._rotation
         in_sensor = wind @ to_platform
@@ -148,15 +150,20 @@ class WindAtSensors:
                 distortion.sine_2,
             )  # fmt: skip
         count = wind.shape[0]
-        motion = self._motion
         turning = np.zeros((count, 3))
         gravity = np.zeros((count, 3))
-        gravity[:, 2] = -relative_wind.STANDARD_GRAVITY
-        if motion is not None:
-            arm = self._lever_arm(instrument.position)
-            turning = motion.angular_rate @ to_platform
-            gravity = relative_wind.felt_gravity(motion, arm, self._drive.dt) @ to_platform
+        if self._motion is not None:
+            turning = self._motion.angular_rate @ to_platform
+        if weighs:
+            gravity = self._gravity(instrument, count) @ to_platform
         if tilt != (0.0, 0.0):
             lean = axis_rotation(tilt)
             in_sensor, turning, gravity = in_sensor @ lean, turning @ lean, gravity @ lean
         return Flow(in_sensor, turning, gravity)
+
+    def _gravity(self, instrument: Instrument, count: int) -> FloatArray:
+        """Gravity minus the instrument's acceleration in platform axes [m/s^2], shape (n, 3)."""
+        if self._motion is None:
+            return np.tile((0.0, 0.0, -relative_wind.STANDARD_GRAVITY), (count, 1))
+        arm = self._lever_arm(instrument.position)
+        return relative_wind.felt_gravity(self._motion, arm, self._drive.dt)
