@@ -18,6 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _SIZES = (33, 65, 129, 257, 513, 1025)
 _TAIL = 1e-13
+_STOPPED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,8 @@ def _solve(
         y = y - min(1.0, float(shortest)) * change
         if np.max(np.abs(change)) < 1e-11 * max(1.0, float(np.max(np.abs(y)))):
             return y, True
+        if np.min(y) < _STOPPED:
+            return y, False
     return y, False
 
 

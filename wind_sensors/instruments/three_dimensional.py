@@ -129,7 +129,7 @@ def tilted_vane_error(tilt: float, relative_azimuth: float, elevation: float) ->
         tilt: Lean of the axis [rad].
         relative_azimuth: Azimuth of the lean minus heading of the wind [rad].
         elevation: Angle of the wind above the horizontal [rad]. To first order the error is
-            elevation * tilt * sin(relative_azimuth); in level wind it is of second order.
+            -elevation * tilt * sin(relative_azimuth); in level wind it is of second order.
     """
     wind = np.array([math.cos(elevation), 0.0, math.sin(elevation)])
     heading = tilted_vane_heading(wind, tilt_matrix(tilt, relative_azimuth))
