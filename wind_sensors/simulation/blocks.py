@@ -30,7 +30,7 @@ class SignalBlock:
     platform: PlatformStates | None
     temperature: Series | None
     pressure: Series | None
-    truth: Winds
+    truth: Winds | None
 
 
 def _together(parts: Sequence[_Signal]) -> _Signal:
@@ -61,7 +61,7 @@ def joined(blocks: Sequence[SignalBlock]) -> SignalBlock:
         platform=_perhaps_together([b.platform for b in blocks]),
         temperature=_perhaps_together([b.temperature for b in blocks]),
         pressure=_perhaps_together([b.pressure for b in blocks]),
-        truth=_together([b.truth for b in blocks]),
+        truth=_perhaps_together([b.truth for b in blocks]),
     )
 
 
@@ -90,7 +90,7 @@ def split(block: SignalBlock, time: int) -> tuple[SignalBlock, SignalBlock]:
     platform = _perhaps_parted(block.platform, time)
     temperature = _perhaps_parted(block.temperature, time)
     pressure = _perhaps_parted(block.pressure, time)
-    truth = _parted(block.truth, time)
+    truth = _perhaps_parted(block.truth, time)
     middle = min(max(time, block.start), block.stop)
     early, late = (
         SignalBlock(

@@ -125,11 +125,20 @@ class SignalStream:
 
     def read(self, until: int) -> SignalBlock:
         """All signals not read yet that are stamped before a time [ns]."""
-        while self._ready is None or self._ready.stop < until:
+        needed = until + self._stamped_ahead(until)
+        while self._ready is None or self._ready.stop < needed:
             block = self.next_block()
             self._ready = block if self._ready is None else joined([self._ready, block])
         wanted, self._ready = split(self._ready, until)
         return wanted
+
+    def _stamped_ahead(self, until: int) -> int:
+        """How long before its measurement a signal may be stamped [ns]: clocks that run late."""
+        elapsed = (until - self.start) * 1e-9
+        clocks = [i.clock for i in self.station.instruments]
+        if self.station.platform is not None:
+            clocks.append(self.station.platform.clock)
+        return round(1e9 * max(0.0, *(-c.latency - c.drift * elapsed for c in clocks)))
 
     def _at(self, seconds: float) -> int:
         return self.start + round(seconds * 1e9)

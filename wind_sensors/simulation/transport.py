@@ -6,22 +6,29 @@ belongs to the message's source and number, so that a live stream and an offline
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.simulation import random_numbers
-from wind_sensors.simulation.blocks import SignalBlock, split
+from wind_sensors.simulation.blocks import SignalBlock
 from wind_sensors.simulation.run import SignalStream
 from wind_sensors.simulation.scenario import TransportFaults
-from wind_sensors.station.signals import PlatformStates, Recording, TimeArray
+from wind_sensors.station.model import Rotor
+from wind_sensors.station.signals import (
+    Angles,
+    PlatformStates,
+    Pulses,
+    Recording,
+    Series,
+    TimeArray,
+    Winds,
+)
 
 FloatArray = npt.NDArray[np.float64]
-
-LONGEST_WAIT_MARGIN = 1_000_000
-"""Added to the longest delay when deciding what can no longer be overtaken [ns]."""
 
 
 class Event(NamedTuple):
@@ -35,15 +42,15 @@ class Event(NamedTuple):
         values: Nothing for an edge; the angle [rad]; wind east, north, up [m/s]; attitude (x, y,
             z, w), velocity, angular rate and position of the platform; a temperature [deg C] or
             pressure [Pa].
-        count: Running number of the message from its source, from 0; what a pulse counter shows,
-            wrapped where the faults say so.
+        number: Running number of the message from its source, from 0; one less than what a pulse
+            counter shows, wrapped where the faults say so.
     """
 
     arrival: int
     source: str
     stamp: int
     values: tuple[float, ...]
-    count: int
+    number: int
 
 
 class Transport:
@@ -70,7 +77,7 @@ class Transport:
         """
         for source, stamps, values in _sources(block):
             self._under_way += self._sent_from(source, stamps, values)
-        self._under_way.sort(key=lambda event: (event.arrival, event.source, event.count))
+        self._under_way.sort(key=lambda event: (event.arrival, event.source, event.number))
         if closed is None:
             arrived, self._under_way = self._under_way, []
             return arrived
@@ -140,7 +147,8 @@ def _sources(block: SignalBlock) -> Iterator[tuple[str, TimeArray, FloatArray]]:
         yield "temperature", block.temperature.time, block.temperature.value[:, np.newaxis]
     if block.pressure is not None:
         yield "pressure", block.pressure.time, block.pressure.value[:, np.newaxis]
-    yield "truth", block.truth.time, block.truth.velocity
+    if block.truth is not None:
+        yield "truth", block.truth.time, block.truth.velocity
 
 
 def live_events(stream: SignalStream, step: float = 1.0) -> Iterator[Event]:
@@ -176,3 +184,62 @@ def events_of(recording: Recording, faults: TransportFaults | None = None) -> li
         truth=recording.truth,
     )
     return Transport(faults or TransportFaults(), recording.start).events(block)
+
+
+def received(recording: Recording, faults: TransportFaults) -> Recording:
+    """The recording that a logger behind a faulty transport would have made.
+
+    Signals stand in the order of their arrival. Rotors with a counter keep the count of the edges
+    that the sensor saw.
+    """
+    by_source: dict[str, list[Event]] = {}
+    for event in events_of(recording, faults):
+        by_source.setdefault(event.source, []).append(event)
+
+    def columns(source: str, width: int) -> tuple[TimeArray, FloatArray]:
+        events = by_source.get(source, [])
+        values = np.array([e.values for e in events], dtype=np.float64).reshape(-1, width)
+        return _stamps_of(events), values
+
+    def winds(source: str, original: Winds | None) -> Winds | None:
+        return None if original is None else Winds(*columns(source, 3))
+
+    def series(source: str, original: Series | None) -> Series | None:
+        if original is None:
+            return None
+        time, values = columns(source, 1)
+        return Series(time, values[:, 0])
+
+    pulses = {}
+    for name in recording.pulses:
+        events = by_source.get(f"pulses/{name}", [])
+        rotor = recording.station.instrument(name)
+        turns = None
+        if isinstance(rotor, Rotor) and rotor.pulses.meaning in {"count", "angle"}:
+            numbers = np.array([e.number for e in events], dtype=np.float64)
+            turns = (numbers + 1.0) / rotor.pulses_per_revolution
+        pulses[name] = Pulses(_stamps_of(events), turns)
+    angles = {}
+    for name in recording.angles:
+        time, values = columns(f"angles/{name}", 1)
+        angles[name] = Angles(time, values[:, 0])
+    platform = None
+    if recording.platform is not None:
+        time, values = columns("platform", 13)
+        platform = PlatformStates(
+            time, values[:, :4], values[:, 4:7], values[:, 7:10], values[:, 10:]
+        )
+    return replace(
+        recording,
+        pulses=pulses,
+        angles=angles,
+        reference=winds("reference", recording.reference),
+        platform=platform,
+        temperature=series("temperature", recording.temperature),
+        pressure=series("pressure", recording.pressure),
+        truth=winds("truth", recording.truth),
+    )
+
+
+def _stamps_of(events: Sequence[Event]) -> TimeArray:
+    return np.array([event.stamp for event in events], dtype=np.int64)

@@ -1,0 +1,265 @@
+"""`wind simulate`: the recording that a station would have made in a wind."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from wind_sensors.errors import UserError
+from wind_sensors.motion.frames import velocity_from_direction, yaw_from_compass
+from wind_sensors.recordings import load_station, read_recording, write_recording
+from wind_sensors.simulation.run import simulate
+from wind_sensors.simulation.scenario import Scenario, TransportFaults
+from wind_sensors.simulation.trajectories import CARRIERS, Trajectory
+from wind_sensors.simulation.transport import received
+from wind_sensors.station.model import Station
+from wind_sensors.station.signals import PlatformStates, Recording, Winds
+from wind_sensors.turbulence.synthesis import TurbulenceSpec, isotropic_spec, surface_layer_spec
+
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def seconds(text: str) -> float:
+    """A duration like `90`, `90s`, `15min`, `1h` in seconds."""
+    for unit in ("min", "h", "s"):
+        if text.endswith(unit):
+            number, factor = text[: -len(unit)], _UNITS[unit]
+            break
+    else:
+        number, factor = text, 1.0
+    try:
+        value = float(number) * factor
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not a duration: write it like 90s, 15min or 1h"
+        ) from problem
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"a duration must be positive, not '{text}'")
+    return value
+
+
+def positive(text: str) -> float:
+    """A positive number."""
+    try:
+        value = float(text)
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from problem
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"must be positive, not '{text}'")
+    return value
+
+
+def share(text: str) -> float:
+    """A number from 0 to below 1."""
+    try:
+        value = float(text)
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from problem
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(f"must lie from 0 to below 1, not '{text}'")
+    return value
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="wind to signals: write the recording a station would make",
+        description="Simulate a station in a turbulent wind and write its RECORDING, with the "
+        "true wind on /truth/wind. What is wrong with the station's instruments stands in the "
+        "station file. The same seed gives the same signals to the bit.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument(
+        "station", metavar="STATION", help="station file, or the name of a shipped configuration"
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder to write")
+    parser.add_argument("--force", action="store_true", help="replace OUT if it is there")
+    parser.add_argument("--duration", type=seconds, default="15min", help="like 90s, 15min, 1h")
+    parser.add_argument("--seed", type=int, default=0, help="of everything random, from 0")
+
+    wind = parser.add_argument_group("wind")
+    wind.add_argument("--speed", type=positive, default=8.0, help="mean wind speed [m/s]")
+    wind.add_argument(
+        "--direction-from", type=float, default=270.0, metavar="DEG",
+        help="direction the wind comes from, clockwise from north",
+    )  # fmt: skip
+    wind.add_argument("--intensity", type=share, default=0.12, help="turbulence intensity sigma/U")
+    wind.add_argument(
+        "--integral-length", type=positive, default=60.0, metavar="M",
+        help="longitudinal integral length [m]",
+    )  # fmt: skip
+    wind.add_argument(
+        "--surface-layer", action="store_true",
+        help="anisotropic turbulence over the station's roughness at its height, instead of "
+        "--intensity and --integral-length",
+    )  # fmt: skip
+    wind.add_argument(
+        "--stability", type=float, default=0.0, metavar="Z/L",
+        help="height over the Monin-Obukhov length, with --surface-layer",
+    )  # fmt: skip
+    wind.add_argument(
+        "--slow-amplitude", type=float, default=0.0, metavar="M/S",
+        help="amplitude of a slow change of the mean speed",
+    )  # fmt: skip
+    wind.add_argument(
+        "--turn-amplitude", type=float, default=0.0, metavar="DEG",
+        help="amplitude of a slow turn of the mean direction",
+    )  # fmt: skip
+    wind.add_argument(
+        "--slow-period", type=seconds, default="10min", help="period of both slow changes"
+    )
+    wind.add_argument(
+        "--wind", metavar="RECORDING", help="blow this recording's reference wind instead"
+    )
+
+    carrier = parser.add_argument_group("carrier (a station with a platform)")
+    carrier.add_argument("--carrier", choices=sorted(CARRIERS), help="how the platform moves")
+    carrier.add_argument("--platform-speed", type=float, metavar="M/S", help="over ground")
+    carrier.add_argument(
+        "--course", type=float, metavar="DEG", default=90.0, help="clockwise from north"
+    )
+    carrier.add_argument(
+        "--follow", metavar="RECORDING", help="move as the platform in this recording"
+    )
+    carrier.add_argument(
+        "--exact-platform", action="store_true", help="the platform reports without noise"
+    )
+
+    air = parser.add_argument_group("air and rates")
+    air.add_argument("--temperature", type=float, default=15.0, help="[deg C]")
+    air.add_argument(
+        "--temperature-amplitude", type=float, default=0.0, help="of a slow change [K]"
+    )
+    air.add_argument("--pressure", type=positive, default=101_325.0, help="[Pa]")
+    air.add_argument("--rate", type=positive, default=20.0, help="of all sampled signals [1/s]")
+
+    faults = parser.add_argument_group("faults of the transport")
+    faults.add_argument("--loss", type=share, default=0.0, help="share of messages lost")
+    faults.add_argument("--doubling", type=share, default=0.0, help="share that comes twice")
+    faults.add_argument("--jitter", type=seconds, default=None, help="largest random delay")
+    faults.add_argument("--nan", type=share, default=0.0, help="share of angles that are NaN")
+    faults.add_argument(
+        "--clock-jump", type=float, nargs=2, metavar=("AT", "BY"),
+        help="the stamping clock jumps by BY seconds AT seconds after the start",
+    )  # fmt: skip
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    console = Console(stderr=True)
+    if args.seed < 0:
+        raise UserError("The seed must not be negative.", "--seed", "Use 0 or more.")
+    station = load_station(args.station)
+    scenario = _scenario(args, station)
+    begin = time.perf_counter()
+    with Progress(
+        TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.0f} s of wind"),
+        TimeElapsedColumn(), console=console, transient=True,
+    ) as progress:  # fmt: skip
+        task = progress.add_task("simulate", total=scenario.duration)
+        recording = simulate(
+            station, scenario, Path(args.output).name,
+            progress=lambda done: progress.update(task, completed=done),
+        )  # fmt: skip
+    spent = time.perf_counter() - begin
+    recording = received(recording, scenario.faults)
+    folder = write_recording(args.output, recording, force=args.force)
+    print(_summary(recording, scenario.duration, spent))
+    print(f"wrote {folder}")
+    return 0
+
+
+def _scenario(args: argparse.Namespace, station: Station) -> Scenario:
+    wind, duration = _wind(args, station)
+    jump_at, jump_by = args.clock_jump if args.clock_jump else (None, 0.0)
+    return Scenario(
+        wind=wind,
+        duration=duration,
+        seed=args.seed,
+        trajectory=_trajectory(args),
+        sample_rate=args.rate,
+        vane_rate=args.rate,
+        reference_rate=args.rate,
+        platform_rate=args.rate,
+        temperature=args.temperature,
+        temperature_amplitude=args.temperature_amplitude,
+        temperature_period=args.slow_period,
+        pressure=args.pressure,
+        platform_noise=not args.exact_platform,
+        faults=TransportFaults(
+            jitter=args.jitter or 0.0,
+            loss=args.loss,
+            doubling=args.doubling,
+            not_a_number=args.nan,
+            clock_jump_at=jump_at,
+            clock_jump=jump_by,
+            seed=args.seed,
+        ),
+    )
+
+
+def _wind(args: argparse.Namespace, station: Station) -> tuple[TurbulenceSpec | Winds, float]:
+    duration = float(args.duration)
+    if args.wind:
+        measured = read_recording(args.wind)
+        if measured.reference is None or measured.reference.time.size < 2:
+            raise UserError("The recording has no reference wind.", args.wind, "Name one that has.")
+        stamps = measured.reference.time
+        return measured.reference, min(duration, float(stamps.max() - stamps.min()) * 1e-9)
+    towards = velocity_from_direction(1.0, args.direction_from)
+    direction = math.atan2(float(towards[1]), float(towards[0]))
+    if args.surface_layer:
+        site = station.recording
+        spec = surface_layer_spec(
+            args.speed, site.measuring_height, site.roughness_length, args.stability,
+            direction=direction, seed=args.seed,
+        )  # fmt: skip
+    else:
+        spec = isotropic_spec(
+            args.speed, args.intensity, args.integral_length, direction, args.seed
+        )
+    slow = replace(
+        spec,
+        slow_amplitude=args.slow_amplitude,
+        slow_period=args.slow_period,
+        turn_amplitude=math.radians(args.turn_amplitude),
+    )
+    return slow, duration
+
+
+def _trajectory(args: argparse.Namespace) -> Trajectory | PlatformStates | None:
+    if args.follow:
+        followed = read_recording(args.follow)
+        if followed.platform is None:
+            raise UserError(
+                "The recording has no platform to follow.", args.follow, "Name one that has."
+            )
+        return followed.platform
+    if args.carrier is None:
+        if args.platform_speed is not None:
+            raise UserError(
+                "--platform-speed needs to know what moves.", "--carrier", "Name a carrier."
+            )
+        return None
+    course = float(yaw_from_compass(args.course))
+    make = CARRIERS[args.carrier]
+    if args.platform_speed is None:
+        return make(course=course, seed=args.seed)
+    return make(speed=args.platform_speed, course=course, seed=args.seed)
+
+
+def _summary(recording: Recording, duration: float, spent: float) -> str:
+    pulses = ", ".join(f"{p.time.size} pulses of {n}" for n, p in recording.pulses.items())
+    angles = ", ".join(f"{a.time.size} readings of {n}" for n, a in recording.angles.items())
+    return (
+        f"simulated {duration:.0f} s in {spent:.1f} s ({duration / spent:.0f} times real time): "
+        f"{pulses}{', ' if pulses and angles else ''}{angles}"
+    )
