@@ -50,7 +50,7 @@ def run_scene(scene: Scene) -> Signals:
     vane_time, vane = _vane(scene, nose)
     odometry_time, odometry = _odometry(scene)
     air_time = np.arange(int(scene.duration)).astype(float)
-    rng = scene.rng
+    rng = scene.noise
     temperature = np.interp(air_time, scene.time, scene.temperature)
     pressure = np.interp(air_time, scene.time, scene.reported_pressure)
     return Signals(
@@ -75,7 +75,7 @@ def _turn(scene: Scene) -> tuple[Array, Array]:
     rate = speed / rotor.geometry.cruise
     fin = station.vane.geometry
     if isinstance(rotor, CupRotor) and isinstance(scene.rotor, CupTracks):
-        first = float(scene.rng.uniform(0.0, 2.0 * np.pi))
+        first = float(scene.noise.uniform(0.0, 2.0 * np.pi))
         azimuth = turn_cups(
             scene.rotor_flow, rotor.geometry, scene.rotor, first, rate, STEP, SUBSTEPS
         )
@@ -113,12 +113,12 @@ def _sonic(scene: Scene) -> tuple[Array, Array]:
     turned = wind.copy()
     turned[:, 0] = cosine * wind[:, 0] - sine * wind[:, 1]
     turned[:, 1] = sine * wind[:, 0] + cosine * wind[:, 1]
-    turned = sonic.gain * turned + sonic.noise * scene.rng.standard_normal(turned.shape)
+    turned = sonic.gain * turned + sonic.noise * scene.noise.standard_normal(turned.shape)
     turned = np.round(turned / SONIC_RESOLUTION) * SONIC_RESOLUTION
     keep = np.ones(time.size, dtype=bool)
-    for _ in range(scene.rng.poisson(sonic.dropouts * scene.duration / 600.0)):
-        begin = scene.rng.uniform(1.0, scene.duration)
-        keep &= (time < begin) | (time > begin + scene.rng.exponential(0.6))
+    for _ in range(scene.noise.poisson(sonic.dropouts * scene.duration / 600.0)):
+        begin = scene.noise.uniform(1.0, scene.duration)
+        keep &= (time < begin) | (time > begin + scene.noise.exponential(0.6))
     return time[keep], turned[keep]
 
 
@@ -128,7 +128,7 @@ def _vane(scene: Scene, nose: Array) -> tuple[Array, Array]:
     rate = scene.station.vane_rate
     time = np.arange(int(scene.duration * rate)) / rate
     angle = np.interp(time, scene.time, nose)
-    angle = wrap(angle + ANGLE_NOISE * scene.rng.standard_normal(time.size))
+    angle = wrap(angle + ANGLE_NOISE * scene.noise.standard_normal(time.size))
     for change in scene.reading_changes:
         angle = change(time, angle)
     return _stamp(scene, "vane", time), wrap(angle)
@@ -157,7 +157,7 @@ def _odometry(scene: Scene) -> tuple[Array, Motion | None]:
     time = np.arange(int(scene.duration * rate)) / rate
     full = scene.reported
     index = np.round(time * GRID_RATE).astype(np.int64)
-    rng = scene.rng
+    rng = scene.noise
     motion = Motion(
         full.position[index],
         full.yaw[index] + np.radians(0.1) * rng.standard_normal(time.size),

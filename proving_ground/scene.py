@@ -28,6 +28,8 @@ AngleChange = Callable[[Array, Array], Array]
 class Scene:
     """State of the world for one record; effects change it in place before it runs.
 
+    rng is for what effects draw; noise is for the measurement, the same whatever is planted.
+
     time (n) [s] is the grid. reference (n, 3) [m/s] earth frame. rotor_flow, vane_flow (n, 3)
     [m/s] apparent wind in the sensor's frame. motion is what the platform does, reported what its
     odometry says. angle_changes act on the nose heading on the grid, reading_changes on the
@@ -37,6 +39,7 @@ class Scene:
 
     station: Station
     rng: np.random.Generator
+    noise: np.random.Generator
     time: Array
     reference: Array
     rotor_flow: Array
@@ -117,6 +120,7 @@ def build_scene(station: Station, weather: Weather, minutes: float, seed: int) -
     scene = Scene(
         station=station,
         rng=rng,
+        noise=np.random.default_rng([seed, station.seed, ord(station.kind), 6]),
         time=time,
         reference=reference,
         rotor_flow=apparent,

@@ -7,7 +7,7 @@ import numpy as np
 from proving_ground.concealed.kinds import (
     Cause,
     Parameters,
-    compass,
+    heading_deg,
     pick_visited_bearing,
 )
 from proving_ground.inflow import Array
@@ -31,7 +31,7 @@ def wake_shadow(scene: Scene, amount: float, activity: Array) -> Parameters:
     scene.vane_flow *= (1.0 - shade * depth)[:, None]
     _turn_flow(scene.vane_flow, swirl)
     return {
-        "bearing_from_deg": compass(scene, bearing),
+        "bearing_from_deg": heading_deg(bearing),
         "depth": round(depth, 4),
         "half_width_deg": round(float(np.degrees(half)), 2),
     }
@@ -49,7 +49,7 @@ def flow_distortion(scene: Scene, amount: float, activity: Array) -> Parameters:
     scene.vane_flow *= (1.0 + speed)[:, None]
     _turn_flow(scene.rotor_flow, bend)
     _turn_flow(scene.vane_flow, bend)
-    return {"toward_deg": compass(scene, toward), "amplitude": round(amount, 4)}
+    return {"toward_deg": heading_deg(toward), "amplitude": round(amount, 4)}
 
 
 def axis_tilt(scene: Scene, amount: float, activity: Array) -> Parameters:
@@ -63,7 +63,7 @@ def axis_tilt(scene: Scene, amount: float, activity: Array) -> Parameters:
     gravity[:, 2] = -9.81
     leaning = gravity + activity[:, None] * (tilted(gravity, tilt, bearing) - gravity)
     scene.vane.gravity_x[:], scene.vane.gravity_y[:] = leaning[:, 0], leaning[:, 1]
-    return {"tilt_deg": round(amount, 3), "towards_deg": compass(scene, bearing)}
+    return {"tilt_deg": round(amount, 3), "towards_deg": heading_deg(bearing)}
 
 
 def rotor_downwash(scene: Scene, amount: float, activity: Array) -> Parameters:

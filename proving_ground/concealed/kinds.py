@@ -42,10 +42,9 @@ def active_at(scene: Scene, activity: Array) -> Callable[[Array], Array]:
     return lambda time: np.interp(time, scene.time, activity)
 
 
-def compass(scene: Scene, bearing: float) -> float:
-    """Bearing for the answer [deg]: clockwise from north on a mast, from the bow on a boat."""
-    zero = 0.0 if scene.station.boat else 90.0
-    return round(float((zero - np.degrees(bearing)) % 360.0), 2)
+def heading_deg(bearing: float) -> float:
+    """A bearing [rad] as answers state it: degrees counter-clockwise from the sensor's x axis."""
+    return round(float(np.degrees(bearing) % 360.0), 2)
 
 
 def pick_visited_bearing(scene: Scene) -> float:
