@@ -1,0 +1,321 @@
+"""Frames, attitudes and platform motion against independent rotations, geometry and sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
+
+from wind_sensors.errors import UserError
+from wind_sensors.motion import frames, relative_wind, rotations
+from wind_sensors.motion.platform_errors import reported_motion, true_motion
+from wind_sensors.motion.platform_track import Motion, PlatformTrack, TrackLimits, shifted
+from wind_sensors.station.model import Clock, Downwash, HeadingDeviation, Platform
+from wind_sensors.station.signals import PlatformStates
+
+angles = st.floats(-3.0, 3.0)
+components = st.floats(-20.0, 20.0)
+vectors = st.tuples(components, components, components).map(np.array)
+attitudes = st.tuples(angles, angles, angles).map(
+    lambda v: Rotation.from_rotvec(np.array(v)).as_quat()
+)
+
+
+def motion_at(attitude, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), count=1) -> Motion:
+    return Motion(
+        np.tile(np.asarray(attitude, dtype=float), (count, 1)),
+        np.tile(np.asarray(velocity, dtype=float), (count, 1)),
+        np.tile(np.asarray(rate, dtype=float), (count, 1)),
+        np.zeros((count, 3)),
+    )
+
+
+def swaying_states(count: int = 400, dt: float = 0.05) -> tuple[PlatformStates, np.ndarray]:
+    """A carrier that turns, rolls and moves; its states by SciPy's rotations."""
+    t = np.arange(count) * dt
+    rpy = np.stack((0.1 * np.sin(t), 0.05 * np.cos(1.3 * t), 0.2 * t), axis=1)
+    attitude = Rotation.from_euler("ZYX", rpy[:, ::-1])
+    h = 1e-5
+    ahead = Rotation.from_euler(
+        "ZYX",
+        np.stack((0.2 * (t + h), 0.05 * np.cos(1.3 * (t + h)), 0.1 * np.sin(t + h)), axis=1),
+    )
+    rate = (attitude.inv() * ahead).as_rotvec() / h
+    position = np.stack((2.0 * t, 3.0 * np.sin(0.5 * t), 0.1 * np.sin(2.0 * t)), axis=1)
+    in_earth = np.stack(
+        (np.full_like(t, 2.0), 1.5 * np.cos(0.5 * t), 0.2 * np.cos(2.0 * t)), axis=1
+    )
+    states = PlatformStates(
+        np.rint(t * 1e9).astype(np.int64),
+        attitude.as_quat(),
+        attitude.inv().apply(in_earth),
+        rate,
+        position,
+    )
+    return states, in_earth
+
+
+@given(attitudes, attitudes, vectors)
+def test_rotations_agree_with_scipy(first, second, vector):
+    a, b = Rotation.from_quat(first), Rotation.from_quat(second)
+    np.testing.assert_allclose(rotations.rotate(first, vector), a.apply(vector), atol=1e-12)
+    np.testing.assert_allclose(rotations.matrix(first), a.as_matrix(), atol=1e-12)
+    both = rotations.multiply(first, second)
+    np.testing.assert_allclose(rotations.matrix(both), (a * b).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(
+        rotations.rotate_back(first, vector), a.inv().apply(vector), atol=1e-12
+    )
+
+
+@given(attitudes, attitudes, st.floats(0.0, 1.0))
+def test_slerp_follows_the_great_circle(first, second, fraction):
+    expected = Slerp([0.0, 1.0], Rotation.from_quat([first, second]))(fraction)
+    found = Rotation.from_quat(rotations.slerp(first, second, np.asarray(fraction)))
+    assert (expected.inv() * found).magnitude() < 1e-6
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
+def test_roll_pitch_yaw_are_turns_about_z_then_y_then_x(roll, pitch, yaw):
+    q = rotations.from_roll_pitch_yaw(roll, pitch, yaw)
+    expected = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
+    np.testing.assert_allclose(rotations.matrix(q), expected, atol=1e-12)
+    np.testing.assert_allclose(
+        rotations.matrix(rotations.from_roll_pitch_yaw(*rotations.to_roll_pitch_yaw(q))),
+        expected,
+        atol=1e-7,
+    )
+
+
+@pytest.mark.parametrize(
+    ("velocity", "from_deg"),
+    [((0, -5, 0), 0.0), ((-5, 0, 0), 90.0), ((0, 5, 0), 180.0), ((5, 0, 0), 270.0)],
+)
+def test_a_north_wind_blows_southwards(velocity, from_deg):
+    assert float(frames.direction_from_deg(velocity)) == pytest.approx(from_deg)
+    np.testing.assert_allclose(frames.velocity_from_direction(5.0, from_deg), velocity, atol=1e-12)
+
+
+def test_compass_headings_count_clockwise_from_the_north_they_name():
+    np.testing.assert_allclose(frames.yaw_from_compass([0.0, 90.0]), [np.pi / 2, 0.0], atol=1e-12)
+    # Magnetic north lies 10 degrees east of true north: a magnetic heading of 350 is true north.
+    assert float(frames.yaw_from_compass(350.0, 10.0)) == pytest.approx(np.pi / 2)
+    assert float(frames.compass_from_yaw(np.pi / 2, 10.0)) == pytest.approx(350.0)
+
+
+@given(attitudes, vectors)
+def test_ned_and_enu_describe_the_same_rotation(attitude, vector):
+    in_ned = frames.attitude_ned_from_enu(attitude)
+    through_ned = frames.swap_enu_ned(rotations.rotate(in_ned, frames.swap_flu_frd(vector)))
+    np.testing.assert_allclose(through_ned, rotations.rotate(attitude, vector), atol=1e-12)
+    back = frames.attitude_enu_from_ned(in_ned)
+    assert abs(float(np.dot(back, attitude))) == pytest.approx(1.0)
+
+
+def test_level_and_facing_north_is_no_rotation_in_ned():
+    facing_north = rotations.from_roll_pitch_yaw(0.0, 0.0, np.pi / 2)
+    in_ned = frames.attitude_ned_from_enu(facing_north)
+    np.testing.assert_allclose(np.abs(in_ned), [0, 0, 0, 1], atol=1e-12)
+
+
+def test_a_steadily_turning_platform_is_interpolated_on_the_sphere():
+    rate = np.array([0.3, -0.2, 0.5])
+    t = np.arange(0.0, 10.0, 0.5)
+    attitude = Rotation.from_rotvec(np.outer(t, rate)).as_quat()
+    zero = np.zeros((t.size, 3))
+    track = PlatformTrack(
+        PlatformStates(np.rint(t * 1e9).astype(np.int64), attitude, zero, zero + rate, zero)
+    )
+    wanted = np.linspace(0.0, 9.4, 57)
+    found = track.at(np.rint(wanted * 1e9).astype(np.int64)).motion.attitude
+    expected = Rotation.from_rotvec(np.outer(wanted, rate))
+    assert (expected.inv() * Rotation.from_quat(found)).magnitude().max() < 1e-8
+
+
+def test_beyond_the_last_state_the_platform_carries_on_and_certainty_falls():
+    states, _ = swaying_states()
+    track = PlatformTrack(states, TrackLimits(longest_extrapolation=0.5))
+    last = int(states.time[-1])
+    ahead = track.at(np.array([last, last + 200_000_000, last + 400_000_000, last + 600_000_000]))
+    assert ahead.known.tolist() == [True, True, True, False]
+    assert np.all(np.diff(ahead.attitude_variance) > 0.0)
+    assert np.all(np.diff(ahead.velocity_variance) > 0.0)
+    turned = Rotation.from_quat(states.attitude[-1]) * Rotation.from_rotvec(
+        0.2 * states.angular_rate[-1]
+    )
+    assert (turned.inv() * Rotation.from_quat(ahead.motion.attitude[1])).magnitude() < 1e-9
+
+
+def test_a_long_gap_is_guesswork_and_its_edges_are_not():
+    states, _ = swaying_states(count=200)
+    keep = np.r_[0:50, 150:200]
+    track = PlatformTrack(
+        PlatformStates(
+            states.time[keep], states.attitude[keep], states.velocity[keep],
+            states.angular_rate[keep], states.position[keep],
+        )
+    )  # fmt: skip
+    sample = track.at(states.time[[40, 49, 100, 150]])
+    assert sample.known.tolist() == [True, True, False, True]
+
+
+def test_unordered_doubled_and_broken_states_do_no_harm():
+    states, _ = swaying_states(count=100)
+    order = np.random.default_rng(1).permutation(np.r_[0:100, 10:20])
+    attitude = states.attitude[order].copy()
+    broken = np.flatnonzero(order == 55)
+    attitude[broken] = np.nan
+    mixed = PlatformStates(
+        states.time[order], attitude, states.velocity[order], states.angular_rate[order],
+        states.position[order],
+    )  # fmt: skip
+    wanted = states.time[[12, 54, 55, 56]]
+    clean = PlatformTrack(states).at(wanted).motion
+    found = PlatformTrack(mixed).at(wanted).motion
+    np.testing.assert_allclose(found.velocity[[0, 1, 3]], clean.velocity[[0, 1, 3]], rtol=1e-12)
+    np.testing.assert_allclose(found.velocity, clean.velocity, atol=2e-3)
+
+
+def test_a_platform_without_a_usable_state_is_the_users_error():
+    nothing = np.full((3, 3), np.nan)
+    with pytest.raises(UserError, match="no usable state"):
+        PlatformTrack(PlatformStates(np.arange(3), np.zeros((3, 4)), nothing, nothing, nothing))
+
+
+def test_apparent_wind_is_the_wind_minus_the_way_the_sensor_goes():
+    """The sensor's velocity from the difference of its positions, not from omega x r."""
+    states, _ = swaying_states(count=4000, dt=0.005)
+    arm = np.array([0.3, -0.2, 4.0])
+    sensor_rotation = relative_wind.sensor_rotation(Platform(sensor_rotation_deg=(3.0, -5.0, 20.0)))
+    wind = np.array([4.0, -3.0, 0.5])
+    attitude = Rotation.from_quat(states.attitude)
+    place = states.position + attitude.apply(arm)
+    velocity = np.gradient(place, 0.005, axis=0)
+    mount = Rotation.from_euler("ZYX", [20.0, -5.0, 3.0], degrees=True)
+    expected = mount.inv().apply(attitude.inv().apply(wind - velocity))
+    motion = Motion(states.attitude, states.velocity, states.angular_rate, states.position)
+    found = relative_wind.apparent_wind(np.tile(wind, (4000, 1)), motion, arm, sensor_rotation)
+    np.testing.assert_allclose(found[5:-5], expected[5:-5], atol=2e-4)
+    back = relative_wind.earth_wind(found, motion, arm, sensor_rotation)
+    np.testing.assert_allclose(back, np.tile(wind, (4000, 1)), atol=1e-9)
+
+
+@given(vectors, vectors, vectors, attitudes, st.floats(-3.0, 3.0))
+def test_turning_the_whole_world_changes_nothing_a_sensor_feels(wind, velocity, rate, q, turn):
+    arm, mount = (0.1, 0.2, 3.0), np.eye(3)
+    before = relative_wind.apparent_wind(wind[None], motion_at(q, velocity, rate), arm, mount)
+    world = Rotation.from_euler("z", turn)
+    turned = motion_at(rotations.turned_about_up(q, turn), velocity, rate)
+    after = relative_wind.apparent_wind(world.apply(wind)[None], turned, arm, mount)
+    np.testing.assert_allclose(after, before, atol=1e-9)
+
+
+@given(vectors, vectors, vectors, attitudes)
+def test_only_the_difference_of_wind_and_platform_velocity_is_felt(wind, velocity, shift, q):
+    arm, mount = (0.0, 0.0, 2.0), np.eye(3)
+    still = relative_wind.apparent_wind(wind[None], motion_at(q, velocity), arm, mount)
+    carried = motion_at(q, velocity + Rotation.from_quat(q).inv().apply(shift))
+    moving = relative_wind.apparent_wind((wind + shift)[None], carried, arm, mount)
+    np.testing.assert_allclose(moving, still, atol=1e-9)
+
+
+@pytest.mark.parametrize("velocity_in_earth", [False, True])
+def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth):
+    draw = np.random.default_rng(5)
+    count = 200_000
+    attitude = Rotation.from_euler("ZYX", [0.7, 0.1, -0.2])
+    velocity, rate = np.array([5.0, 1.0, -0.5]), np.array([0.3, 0.2, 0.5])
+    arm = np.array([0.5, 0.2, 3.0])
+    mount = relative_wind.sensor_rotation(Platform(sensor_rotation_deg=(0.0, 10.0, 30.0)))
+    apparent = np.array([-6.0, 2.0, 0.3])
+    spread = np.diag([0.04, 0.09, 0.01])
+    predicted = relative_wind.earth_wind_covariance(
+        apparent[None], spread, motion_at(attitude.as_quat(), velocity, rate), arm, mount,
+        attitude_variance=4e-4, velocity_variance=0.01, mounting_variance=1e-4,
+        rate_variance=2.5e-3, velocity_in_earth=velocity_in_earth,
+    )[0]  # fmt: skip
+    shown = attitude * Rotation.from_rotvec(0.02 * draw.normal(size=(count, 3)))
+    turned = Rotation.from_matrix(mount) * Rotation.from_rotvec(0.01 * draw.normal(size=(count, 3)))
+    flow = turned.apply(apparent + draw.normal(size=(count, 3)) * np.sqrt(np.diag(spread)))
+    swing = np.cross(rate + 0.05 * draw.normal(size=(count, 3)), arm)
+    noise = 0.1 * draw.normal(size=(count, 3))
+    if velocity_in_earth:
+        wind = shown.apply(flow + swing) + attitude.apply(velocity) + noise
+    else:
+        wind = shown.apply(flow + swing + velocity + noise)
+    found = np.cov(wind.T)
+    np.testing.assert_allclose(predicted, found, atol=0.02 * np.abs(found).max())
+
+
+@settings(max_examples=50)
+@given(
+    st.floats(-20.0, 20.0), st.floats(-15.0, 15.0), st.floats(-15.0, 15.0),
+    st.floats(0.7, 1.4), st.sampled_from(["enu", "ned"]), st.sampled_from(["platform", "earth"]),
+    st.floats(-30.0, 30.0),
+)  # fmt: skip
+def test_what_a_platform_reports_leads_back_to_what_it_did(a, b, c, scale, frame, axes, north):
+    platform = Platform(
+        heading_deviation=HeadingDeviation(constant_deg=a, sine_deg=b, cosine_deg=c),
+        velocity_scale=scale, frame=frame, velocity_axes=axes, heading_reference="magnetic",
+        magnetic_declination_deg=north,
+    )  # fmt: skip
+    states, _ = swaying_states(count=100)
+    motion = Motion(states.attitude, states.velocity, states.angular_rate, states.position)
+    back = true_motion(platform, reported_motion(platform, motion), 0.05)
+    same = Rotation.from_quat(back.attitude).inv() * Rotation.from_quat(motion.attitude)
+    assert same.magnitude().max() < 1e-7
+    np.testing.assert_allclose(back.velocity, motion.velocity, atol=1e-6)
+    np.testing.assert_allclose(back.angular_rate, motion.angular_rate, atol=1e-12)
+    np.testing.assert_allclose(back.position, motion.position, atol=1e-9)
+
+
+def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading():
+    platform = Platform(
+        heading_deviation=HeadingDeviation(constant_deg=2.0, sine_deg=5.0, cosine_deg=-3.0),
+        heading_reference="magnetic", magnetic_declination_deg=8.0,
+    )  # fmt: skip
+    headings = np.arange(0.0, 360.0, 30.0)
+    yaw = frames.yaw_from_compass(headings)
+    motion = Motion(
+        rotations.from_roll_pitch_yaw(0.1, -0.05, yaw), *(np.zeros((12, 3)) for _ in range(3))
+    )
+    shown = frames.compass_from_yaw(frames.heading_of(reported_motion(platform, motion).attitude))
+    magnetic = np.radians(headings - 8.0)
+    expected = headings - 8.0 + 2.0 + 5.0 * np.sin(magnetic) - 3.0 * np.cos(magnetic)
+    assert np.abs((shown - expected + 180.0) % 360.0 - 180.0).max() < 1e-9
+
+
+def test_a_late_clock_shows_an_earlier_state():
+    states, _ = swaying_states(count=400)
+    motion = Motion(states.attitude, states.velocity, states.angular_rate, states.position)
+    late = shifted(motion, 0.05, -0.2)
+    found = true_motion(Platform(clock=Clock(latency=0.2)), late, 0.05)
+    np.testing.assert_allclose(found.position[10:-10], motion.position[10:-10], atol=1e-9)
+    np.testing.assert_allclose(found.velocity[10:-10], motion.velocity[10:-10], atol=1e-9)
+
+
+@given(st.floats(0.5, 10.0), st.floats(0.0, 20.0))
+def test_downwash_obeys_momentum_theory(hover, airspeed):
+    added = relative_wind.rotor_downwash(
+        Downwash(induced_velocity=hover, wake_skew=0.5), np.array([[-airspeed, 0.0, 0.0]])
+    )[0]
+    induced = -added[2]
+    assert induced * np.hypot(airspeed, induced) == pytest.approx(hover**2, rel=1e-6)
+    assert added[0] == pytest.approx(-0.5 * induced * airspeed / hover)
+
+
+def test_felt_gravity_is_the_plumb_line_of_a_swing():
+    """A body in free fall feels nothing; one at rest and leaning feels g along its own axes."""
+    t = np.arange(100) * 0.05
+    fall = np.zeros((100, 3))
+    fall[:, 2] = -relative_wind.STANDARD_GRAVITY * t
+    level = np.tile(rotations.IDENTITY, (100, 1))
+    falling = Motion(level, fall, np.zeros((100, 3)), np.zeros((100, 3)))
+    np.testing.assert_allclose(relative_wind.felt_gravity(falling, (0, 0, 0), 0.05), 0.0, atol=1e-9)
+    lean = motion_at(Rotation.from_euler("y", 0.2).as_quat(), count=5)
+    felt = relative_wind.felt_gravity(lean, (0.0, 0.0, 1.0), 0.05)
+    g = relative_wind.STANDARD_GRAVITY
+    np.testing.assert_allclose(
+        felt, np.tile((g * np.sin(0.2), 0.0, -g * np.cos(0.2)), (5, 1)), atol=1e-9
+    )
