@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 from rosbags.typesys.store import Typestore
 
-from wind_sensors.estimation.outputs import ProcessedRecording, WindowStatistics
+from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.recordings.raw_topics import running_time
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.station.inputs import FieldPath
 from wind_sensors.station.signals import FloatArray, TimeArray
+
+if TYPE_CHECKING:
+    from wind_sensors.estimation.outputs import ProcessedRecording, WindowStatistics
 
 TWIST = "geometry_msgs/msg/TwistWithCovarianceStamped"
 VECTOR = "geometry_msgs/msg/Vector3Stamped"
 NUMBER = "std_msgs/msg/Float64"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 SENSOR_FRAME = "sensor"
-
-
-def direction_from_deg(east: npt.ArrayLike, north: npt.ArrayLike) -> FloatArray:
-    """Direction the wind comes from [deg clockwise from north, 0 to 360)."""
-    bearing = np.arctan2(-np.asarray(east), -np.asarray(north))
-    return np.asarray(np.mod(np.degrees(bearing), 360.0), dtype=np.float64)
 
 
 def estimate_topics(
@@ -95,7 +92,7 @@ def _window_topics(
     ]
     numbers = {
         "speed": [w.scalar_mean for w in windows],
-        "direction_from": direction_from_deg(mean[:, 0], mean[:, 1]),
+        "direction_from": direction_from_deg(mean),
         "direction_variance": [w.corrected_direction_variance for w in windows],
     }
     for term in sorted({name for w in windows for name in w.bias_terms}):

@@ -86,26 +86,23 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
     reader = _SignalReader(content, where, list(content.notes))
     pulses: dict[str, Pulses] = {}
     angles: dict[str, Angles] = {}
-    wanted = 0
     for instrument in station.instruments:
         if isinstance(instrument, (Cup, Propeller)):
-            wanted += 1
             rotor_pulses = reader.pulses(instrument)
             if rotor_pulses is not None:
                 pulses[instrument.name] = rotor_pulses
         else:
             for signal, source in angle_inputs(instrument).items():
-                wanted += 1
                 readings = reader.angles(instrument, signal, source)
                 if readings is not None:
                     angles[signal] = readings
-    if wanted and not pulses and not angles:
+    reference = reader.winds(station.reference.topic) if station.reference else None
+    if not pulses and not angles and reference is None:
         raise UserError(
             "the bag has none of the station's topics.",
             where,
             f"Topics in the bag: {', '.join(sorted(content.topics)) or 'none'}.",
         )
-    reference = reader.winds(station.reference.topic) if station.reference else None
     truth_topic = next((t for t in content.topics if t.endswith(TRUTH_TOPIC)), None)
     truth = reader.winds(Input(topic=truth_topic)) if truth_topic else None
     platform = platform_states(station, content, reader.notes) if station.platform else None

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from wind_sensors.errors import UserError
-from wind_sensors.estimation.outputs import ProcessedRecording
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.estimate_topics import estimate_topics
 from wind_sensors.recordings.raw_topics import raw_topics
@@ -18,6 +18,9 @@ from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.serialising import TopicMessages
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.writing import station_to_yaml
+
+if TYPE_CHECKING:
+    from wind_sensors.estimation.outputs import ProcessedRecording
 
 
 def write_recording(
@@ -45,10 +48,7 @@ def write_recording(
     """
     types = typestore()
     topics = raw_topics(recording, types)
-    if isinstance(outputs, ProcessedRecording):
-        topics += estimate_topics(outputs, types)
-    else:
-        topics += outputs
+    topics += outputs if isinstance(outputs, Sequence) else estimate_topics(outputs, types)
     return write_topics(folder, station_to_yaml(recording.station), topics, force=force)
 
 

@@ -328,7 +328,10 @@ class RecordingInfo(Entry):
     """When and where."""
 
     start: str = "1970-01-01T00:00:00Z"
+    """First moment of the recording, UTC."""
     frame: str = "enu"
+    averaging_time: NonNegative = 0.0
+    """Every message is a mean over this time [s] and stamped at its end; 0: samples."""
     measuring_height: Positive = 10.0
     roughness_length: Positive = 0.03
 

@@ -1,0 +1,215 @@
+"""The mapping file: which column or sentence of a foreign file becomes which topic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from io import StringIO
+from typing import Literal
+
+from pydantic import ConfigDict, Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.station_files import shipped_profiles
+from wind_sensors.station.document import Document, parse
+from wind_sensors.station.model import Entry, Station
+from wind_sensors.station.reading import station_of
+
+UNITS: dict[str, tuple[float, float]] = {
+    "": (1.0, 0.0),
+    "m/s": (1.0, 0.0),
+    "kn": (1852.0 / 3600.0, 0.0),
+    "km/h": (1.0 / 3.6, 0.0),
+    "mph": (0.44704, 0.0),
+    "rad": (1.0, 0.0),
+    "deg": (0.017453292519943295, 0.0),
+    "degC": (1.0, 0.0),
+    "K": (1.0, -273.15),
+    "degF": (5.0 / 9.0, -160.0 / 9.0),
+    "Pa": (1.0, 0.0),
+    "hPa": (100.0, 0.0),
+    "mbar": (100.0, 0.0),
+    "kPa": (1000.0, 0.0),
+    "%": (0.01, 0.0),
+    "m": (1.0, 0.0),
+    "mm": (0.001, 0.0),
+    "ft": (0.3048, 0.0),
+    "Hz": (1.0, 0.0),
+    "V": (1.0, 0.0),
+    "mV": (0.001, 0.0),
+}
+"""Factor and offset to the unit of the messages: SI, with degrees Celsius for temperatures."""
+
+
+class Source(Entry):
+    """Where a number stands in the file."""
+
+    column: str = ""
+    """Name of a table's column."""
+    sentence: str = ""
+    """Three letters of an NMEA 0183 sentence."""
+    value: int = Field(default=1, ge=1)
+    """Position of the number in the sentence, counted from 1 after the sentence's name."""
+    where: dict[int, str] = Field(default_factory=dict)
+    """Fields that must have these texts, e.g. `{2: R, 5: A}` for relative, valid MWV."""
+    unit: str = ""
+    """Unit in the file; the messages get SI (temperatures: deg C)."""
+    direction: Literal["", "from_north", "from_bow"] = ""
+    """For angles in degrees: clockwise from north or from the bow, where the wind comes from; the
+    message gets the nose's heading counter-clockwise from the sensor's x axis (east, or
+    forward)."""
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Source:
+        if bool(self.column) == bool(self.sentence):
+            raise ValueError("name either a `column` of a table or a `sentence` of an NMEA log")
+        if self.unit not in UNITS:
+            known = ", ".join(unit for unit in UNITS if unit)
+            raise ValueError(f"'{self.unit}' is not a known unit: write one of {known}")
+        return self
+
+
+class PulseScale(Entry):
+    """The logger's calibration, which hides the number of pulses in an interval."""
+
+    scale: float
+    """Speed per pulse in one interval."""
+    offset: float = 0.0
+    """Speed at no pulse."""
+
+
+class Signal(Source):
+    """One number becomes one field of one topic."""
+
+    topic: str
+    """Topic that gets it; several numbers of one instant may share a topic."""
+    type: str = "std_msgs/msg/Float64"
+    """ROS message type."""
+    field: str = ""
+    """Field of the message; empty: the type's default."""
+    pulses: PulseScale | None = None
+    """The number is a speed; its pulses are counted up and the message gets the count."""
+
+
+class Vector(Entry):
+    """A speed and a direction become a wind vector, where the air goes (ENU)."""
+
+    topic: str
+    type: str = "geometry_msgs/msg/Vector3Stamped"
+    speed: Source
+    direction_from: Source
+    """Clockwise from north, where the wind comes from."""
+
+    @model_validator(mode="after")
+    def _is_an_angle(self) -> Vector:
+        if self.direction_from.unit not in {"deg", "rad"} or self.direction_from.direction:
+            raise ValueError("`direction_from` needs `unit: deg` (or rad) and nothing else")
+        return self
+
+
+class PlatformSource(Entry):
+    """Compass, course and position become nav_msgs/Odometry.
+
+    The attitude has the compass heading as its yaw, uncorrected (the station file says what it
+    refers to), and no roll and pitch. The twist holds the velocity over ground east, north: the
+    station file says `velocity_axes: earth`. The position counts from the first fix, east, north.
+    """
+
+    topic: str = "/platform/odom"
+    heading: Source
+    speed: Source
+    course: Source
+    latitude: Source | None = None
+    longitude: Source | None = None
+
+
+class TimeColumn(Entry):
+    """How a table tells the time."""
+
+    column: str = "TIMESTAMP"
+    format: str = ""
+    """As for strptime; empty: ISO 8601."""
+    zone: str = "UTC"
+    """UTC, an offset as +01:00, or a name as Europe/Berlin."""
+    mark: Literal["end", "start"] = "end"
+    """Whether the stamp is the end or the start of the station's `recording.averaging_time`; the
+    messages get its end."""
+
+
+class Mapping(Entry):
+    """A whole mapping file."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
+    format: Literal["csv", "toa5", "nrg", "nmea0183"]
+    """csv: names in the first line; toa5: Campbell Scientific; nrg: NRG logger exports."""
+    delimiter: str = ""
+    """Between a table's columns; empty: comma, and a tab for nrg."""
+    missing: tuple[str, ...] = ("", "NAN", "NaN", "nan", "INF", "-INF", "NULL", "-9999")
+    """Texts that stand for no value."""
+    time: TimeColumn = TimeColumn()
+    talkers: tuple[str, ...] = ()
+    """First letters of the NMEA sentences to take; empty: all."""
+    signals: tuple[Signal, ...] = ()
+    vectors: tuple[Vector, ...] = ()
+    platform: PlatformSource | None = None
+
+    @property
+    def sources(self) -> list[Source]:
+        """Every number the mapping asks for."""
+        found: list[Source] = list(self.signals)
+        for vector in self.vectors:
+            found += [vector.speed, vector.direction_from]
+        if self.platform is not None:
+            parts = self.platform
+            found += [parts.heading, parts.speed, parts.course]
+            found += [part for part in (parts.latitude, parts.longitude) if part is not None]
+        return found
+
+
+@dataclass(frozen=True)
+class MappingFile:
+    """A validated mapping and the station file it carries.
+
+    Attributes:
+        mapping: How to read the files.
+        station: The station that the recording will name.
+        station_text: Its text, with the comments of the mapping file.
+    """
+
+    mapping: Mapping
+    station: Station
+    station_text: str
+
+
+def read_mapping(text: str, name: str) -> MappingFile:
+    """Validate the text of a mapping file.
+
+    Args:
+        text: YAML; beside the keys of `Mapping` it has `station`, a whole station file.
+        name: File name for messages.
+
+    Raises:
+        UserError: The file is wrong; every fault is listed with its line.
+    """
+    document = parse(text, name)
+    if not isinstance(document.data, dict) or "station" not in document.data:
+        raise UserError("the mapping has no `station`.", name, "Add the station file's keys there.")
+    inner = {path[1:]: line for path, line in document.lines.items() if path[:1] == ("station",)}
+    station = station_of(Document(name, document.data["station"], inner), shipped_profiles())
+    given = {key: value for key, value in document.data.items() if key != "station"}
+    try:
+        mapping = Mapping.model_validate(given)
+    except ValidationError as error:
+        faults = []
+        for detail in error.errors(include_url=False):
+            path = tuple(detail["loc"])
+            key = ".".join(str(step) for step in path)
+            message = detail["msg"].removeprefix("Value error, ")
+            faults.append(f"\n  {document.where(path)}: {key}: {message}.")
+        raise UserError(f"{len(faults)} problems:{''.join(faults)}", name) from None
+    stream = StringIO()
+    yaml = YAML(typ="rt")
+    yaml.width = 100
+    yaml.dump(yaml.load(text)["station"], stream)
+    return MappingFile(mapping, station, stream.getvalue())
