@@ -82,7 +82,11 @@ def execute(target: str, arguments: Sequence[str] | None = None) -> int:
     module, _, function = target.partition(":")
     given = list(sys.argv[1:] if arguments is None else arguments)
     build: Callable[[list[str]], Sequence[Node]] = getattr(import_module(module), function)
-    return run(lambda: build(given), given)
+    try:
+        return run(lambda: build(given), given)
+    except UserError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
 
 
 def run(
@@ -102,11 +106,21 @@ def run(
         until: Asked after each batch of callbacks, at least twice a second; True ends the run.
 
     Returns:
-        Exit status: 0, or 2 after a mistake of the user.
+        Exit status 0.
+
+    Raises:
+        UserError: A mistake of the user, or no rclpy.
     """
-    import rclpy
-    from rclpy.exceptions import ParameterException
-    from rclpy.executors import ExternalShutdownException
+    try:
+        import rclpy
+        from rclpy.exceptions import ParameterException
+        from rclpy.executors import ExternalShutdownException
+    except ImportError as error:
+        raise UserError(
+            f"live topics need rclpy, which cannot be imported ({error}).",
+            remedy="Source a ROS 2 installation, or use the virtual environment that "
+            "`make test` builds.",
+        ) from None
 
     nodes: list[Node] = []
     executor: Executor | None = None
@@ -123,9 +137,8 @@ def run(
             executor.spin_once(timeout_sec=_WAKE_UP_PERIOD)
     except (_Stopped, KeyboardInterrupt, ExternalShutdownException):
         pass
-    except (UserError, ParameterException) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+    except ParameterException as error:
+        raise UserError(f"{error}.", "parameters") from error
     except Exception as error:
         if rclpy.ok() or not _is_consequence_of_shutdown(error):
             raise

@@ -122,7 +122,9 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Value]:
                         to_value=math.inf if high is None else float(high),
                     )
                 ]
-        default = list(parameter.default) if parameter.kind is tuple else parameter.default
+        default = (
+            list(parameter.default) if isinstance(parameter.default, tuple) else parameter.default
+        )
         given = node.declare_parameter(parameter.name, default, descriptor, ignore_override=False)
         values[parameter.name] = _accepted(node, parameter, given.value)
     return values
@@ -165,13 +167,11 @@ def describe(table: Sequence[Parameter]) -> str:
         facts = [kind]
         if parameter.default is not None and parameter.default != "":
             shown = (
-                str(parameter.default).lower()
-                if parameter.kind is bool
-                else str(parameter.default)
+                str(parameter.default).lower() if parameter.kind is bool else str(parameter.default)
             )
             facts.append(f"default {shown}")
         if parameter.choices:
-            facts.append(" | ".join(parameter.choices))
+            facts.append(" | ".join(word for word in parameter.choices if word))
         if parameter.minimum is not None or parameter.maximum is not None:
             low = "" if parameter.minimum is None else f"{parameter.minimum:g}"
             high = "" if parameter.maximum is None else f"{parameter.maximum:g}"

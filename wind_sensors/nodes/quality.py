@@ -29,9 +29,7 @@ def input_quality(*, reliable: bool = False, depth: int = INPUT_DEPTH) -> QoSPro
         depth: Messages kept.
     """
     reliability = QoSReliabilityPolicy.RELIABLE if reliable else QoSReliabilityPolicy.BEST_EFFORT
-    return QoSProfile(
-        history=QoSHistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability
-    )
+    return QoSProfile(history=QoSHistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability)
 
 
 def output_quality(depth: int = OUTPUT_DEPTH) -> QoSProfile:

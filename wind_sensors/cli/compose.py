@@ -1,0 +1,96 @@
+"""`wind compose`: simulator, estimator and recorder of a station in one process."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from wind_sensors.nodes.composition import Composition
+
+
+def register(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "compose",
+        help="simulator, estimators and recorder of a station in one process",
+        description="Run the simulated signals of a station, the estimator that fits its "
+        "instruments and, with -o, a recorder in one process, until Ctrl-C or --duration. Every "
+        "further parameter of the nodes: --ros-args -p sim_node:NAME:=VALUE (or -p "
+        "cup_vane_node:NAME:=VALUE).",
+    )
+    parser.add_argument(
+        "station", metavar="STATION", help="station file, or the name of a shipped configuration"
+    )
+    parser.add_argument("-o", "--output", metavar="OUT", help="record everything to OUT")
+    parser.add_argument("--force", action="store_true", help="replace OUT")
+    parser.add_argument("--duration", type=float, default=0.0, metavar="S", help="simulated time")
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="X times as fast as real time, with /clock",
+    )
+    parser.add_argument("--seed", type=int, help="of everything random")
+    parser.add_argument("--mean-speed", type=float, metavar="M/S", help="mean wind speed")
+    parser.add_argument("--intensity", type=float, help="turbulence intensity sigma/U")
+    parser.add_argument("--method", help="kalman, inverse or naive")
+    parser.add_argument("--window", type=float, metavar="S", help="averaging time")
+    add_ros_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from wind_sensors.cli.record import show
+    from wind_sensors.nodes import execution
+
+    simulation: dict[str, object] = {
+        "duration": args.duration,
+        "speed": args.rate,
+        "seed": args.seed,
+        "mean_speed": args.mean_speed,
+        "intensity": args.intensity,
+        "publish_truth": True,
+        "publish_clock": args.rate != 1.0,
+    }
+    estimation: dict[str, object] = {"method": args.method, "window": args.window}
+    made: list[Composition] = []
+
+    def build() -> list[Node]:
+        from wind_sensors.nodes.composition import Composition
+
+        made.append(
+            Composition(args.station, simulation, estimation, args.output, force=args.force)
+        )
+        return made[0].nodes()
+
+    console = Console()
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} s"),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("starting", total=args.duration or None)
+
+        def until() -> bool:
+            progress.update(
+                task,
+                completed=made[0].simulator.elapsed,
+                description=made[0].estimator.last_wind or "no wind yet",
+            )
+            return made[0].has_ended()
+
+        execution.run(build, ros_arguments(args), until=until)
+    if made and made[0].recorder is not None:
+        show(made[0].recorder, args.output, console)
+    return 0

@@ -1,0 +1,106 @@
+"""`wind replay`: a recording as live topics."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
+
+if TYPE_CHECKING:
+    from wind_sensors.nodes.player import PlayerNode
+
+
+def register(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "replay",
+        help="publish a recording as live topics",
+        description="Publish the messages of a recording at their times of recording, with "
+        "/clock, so that nodes with use_sim_time see the time of the recording.",
+    )
+    parser.add_argument("recording", metavar="RECORDING", help="recording folder, or a bag")
+    parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="X times as fast")
+    parser.add_argument("--loop", action="store_true", help="start again at the end")
+    parser.add_argument("--topics", nargs="+", metavar="TOPIC", help="these topics alone")
+    parser.add_argument(
+        "--inputs-only",
+        action="store_true",
+        help="leave out the wind and diagnostics that an estimator had published",
+    )
+    parser.add_argument(
+        "--no-clock", dest="clock", action="store_false", help="do not publish /clock"
+    )
+    parser.add_argument(
+        "--wait-for",
+        type=int,
+        default=0,
+        metavar="N",
+        help="begin when each topic has N subscribers",
+    )
+    add_ros_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from wind_sensors.errors import UserError
+    from wind_sensors.nodes import execution
+    from wind_sensors.recordings.bag import read_bag
+    from wind_sensors.recordings.reading import BAG_FOLDER
+
+    if args.rate <= 0.0:
+        raise UserError(f"--rate is {args.rate:g}.", remedy="Give a positive number.")
+    folder = Path(args.recording)
+    if not folder.exists():
+        raise UserError("there is no such recording.", str(folder), "Check the path.")
+    content = read_bag(folder / BAG_FOLDER if (folder / BAG_FOLDER).exists() else folder)
+    console = Console()
+    for note in content.notes:
+        console.print(f"note: {note}")
+    topics = args.topics
+    if args.inputs_only:
+        outputs = ("/wind", "/diagnostics")
+        topics = [
+            name
+            for name in (topics or content.topics)
+            if not any(name == o or name.startswith(f"{o}/") for o in outputs)
+        ]
+    made: list[PlayerNode] = []
+
+    def build() -> list[PlayerNode]:
+        from wind_sensors.nodes.player import PlayerNode
+
+        made.append(
+            PlayerNode(
+                content,
+                topics,
+                rate=args.rate,
+                loop=args.loop,
+                with_clock=args.clock,
+                wait_for_subscribers=args.wait_for,
+            )
+        )
+        return made
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("replaying", total=None)
+
+        def until() -> bool:
+            player = made[0]
+            progress.update(task, completed=player.position, total=player.duration)
+            return player.finished
+
+        execution.run(build, ros_arguments(args), until=until)
+    if made:
+        console.print(f"Published {made[0].published} messages from {args.recording}.")
+    return 0

@@ -1,0 +1,434 @@
+"""The node that all instruments share: raw messages in, corrected wind out."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import time
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.utilities import remove_ros_args
+
+from wind_sensors.errors import UserError
+from wind_sensors.estimation import METHODS, EstimatorSettings, make_estimator
+from wind_sensors.motion.frames import direction_from_deg
+from wind_sensors.nodes.diagnostics import Level, Status, Updater
+from wind_sensors.nodes.inputs import EstimatorInputs
+from wind_sensors.nodes.outputs import TOPICS, WindPublishers
+from wind_sensors.nodes.parameters import Parameter, Value, changed, declare, describe
+from wind_sensors.nodes.quality import INPUT_DEPTH, input_quality, subscribe
+from wind_sensors.nodes.station_parameters import (
+    STATION,
+    Role,
+    base_document,
+    effective_value,
+    require,
+    station_table,
+    station_with,
+)
+
+if TYPE_CHECKING:
+    from wind_sensors.estimation.outputs import WindEstimate
+    from wind_sensors.station.model import Station
+
+_DEFAULTS = EstimatorSettings()
+
+SETTINGS: tuple[Parameter, ...] = (
+    Parameter(
+        "method",
+        str,
+        _DEFAULTS.method,
+        "How wind follows from the signals: kalman (turbulence, instruments and pulse times in "
+        "one filter with a fixed-lag smoother), inverse (the instruments' equations solved for "
+        "the wind), naive (the calibration alone, for comparison).",
+        choices=tuple(METHODS),
+        changeable=True,
+    ),
+    Parameter(
+        "output_rate",
+        float,
+        _DEFAULTS.output_rate,
+        "Estimates per second [Hz].",
+        minimum=0.1,
+        maximum=200.0,
+        changeable=True,
+    ),
+    Parameter(
+        "smoother_lag",
+        float,
+        _DEFAULTS.smoother_lag,
+        "How much later data may still improve an estimate [s]; the estimate is late by this.",
+        minimum=0.05,
+        maximum=600.0,
+        changeable=True,
+    ),
+    Parameter(
+        "reordering_window",
+        float,
+        _DEFAULTS.reordering_window,
+        "How long to wait for messages that arrive out of order [s].",
+        minimum=0.0,
+        maximum=10.0,
+        changeable=True,
+    ),
+    Parameter(
+        "bandwidth",
+        float,
+        _DEFAULTS.bandwidth,
+        "Cut-off frequency of the noise filter of method inverse [Hz].",
+        minimum=0.01,
+        maximum=50.0,
+        changeable=True,
+    ),
+    Parameter(
+        "window",
+        float,
+        _DEFAULTS.window,
+        "Averaging time of the mean wind and its biases [s].",
+        minimum=1.0,
+        maximum=86400.0,
+        changeable=True,
+    ),
+    Parameter(
+        "adaptation_time",
+        float,
+        _DEFAULTS.adaptation_time,
+        "Memory of the turbulence that the filter assumes [s].",
+        minimum=5.0,
+        maximum=3600.0,
+        changeable=True,
+    ),
+    Parameter(
+        "stop_time",
+        float,
+        _DEFAULTS.stop_time,
+        "A rotor without an edge for this long has stopped [s].",
+        minimum=0.5,
+        maximum=600.0,
+        changeable=True,
+    ),
+    Parameter(
+        "gap_time",
+        float,
+        _DEFAULTS.gap_time,
+        "An input silent for this long has a gap [s].",
+        minimum=0.1,
+        maximum=600.0,
+        changeable=True,
+    ),
+    Parameter(
+        "jump_time",
+        float,
+        _DEFAULTS.jump_time,
+        "A clock that steps back by more than this restarts the estimator [s].",
+        minimum=0.5,
+        maximum=600.0,
+        changeable=True,
+    ),
+    Parameter(
+        "turbulence_intensity",
+        float,
+        _DEFAULTS.turbulence_intensity,
+        "Standard deviation over mean speed, assumed until the data have spoken.",
+        minimum=0.01,
+        maximum=1.0,
+        changeable=True,
+    ),
+    Parameter(
+        "use_air",
+        bool,
+        _DEFAULTS.use_air,
+        "Use temperature and pressure for the air density where they are measured.",
+        changeable=True,
+    ),
+)
+"""Parameters that make up `EstimatorSettings`."""
+
+NODE_PARAMETERS: tuple[Parameter, ...] = (
+    STATION,
+    *SETTINGS,
+    Parameter(
+        "frame_id",
+        str,
+        "map",
+        "Frame of the earth-fixed outputs; its axes point east, north, up.",
+        changeable=True,
+    ),
+    Parameter(
+        "sensor_frame_id",
+        str,
+        "wind_sensor",
+        "Frame of wind/apparent: x forward, y left, z up.",
+        changeable=True,
+    ),
+    Parameter(
+        "nmea",
+        bool,
+        False,
+        "Publish NMEA 0183 MWV and MWD sentences on wind/nmea.",
+        changeable=True,
+    ),
+    Parameter("nmea_talker", str, "WI", "Talker of the sentences, two letters.", changeable=True),
+    Parameter(
+        "nmea_rate",
+        float,
+        1.0,
+        "Sentences per second [Hz].",
+        minimum=0.01,
+        maximum=20.0,
+        changeable=True,
+    ),
+    Parameter(
+        "reliable_inputs",
+        bool,
+        False,
+        "Ask for lost raw messages again; needs publishers that are reliable too.",
+    ),
+    Parameter(
+        "input_depth",
+        int,
+        INPUT_DEPTH,
+        "Raw messages kept for a busy node.",
+        minimum=1,
+        maximum=1_000_000,
+    ),
+    Parameter(
+        "silence",
+        float,
+        2.0,
+        "When nothing at all has arrived for this long of wall time [s], the node's own clock "
+        "moves the estimate on.",
+        minimum=0.1,
+        maximum=600.0,
+        changeable=True,
+    ),
+    Parameter(
+        "diagnostics_period", float, 1.0, "Between diagnostics [s].", minimum=0.05, maximum=60.0
+    ),
+)
+"""Parameters of every estimator node, besides those of its instruments."""
+
+_SECOND = 1_000_000_000
+_IDLE_CHECK = 0.25
+
+
+class NodeKind(NamedTuple):
+    """What distinguishes one estimator node from the others.
+
+    Attributes:
+        name: Of the node and its executable.
+        purpose: One paragraph for `--help`.
+        needs: Kinds of instruments the station must have.
+        roles: Instruments expected where no station file is given.
+    """
+
+    name: str
+    purpose: str
+    needs: tuple[str, ...]
+    roles: tuple[Role, ...]
+
+
+class EstimatorNode(Node):
+    """Feeds an estimator with a station's messages and publishes what it finds.
+
+    Args:
+        kind: Which node.
+        options: Further arguments of rclpy's Node (context, parameter_overrides, namespace, ...).
+
+    Attributes:
+        station: The station as it is after parameters.
+        received_at: Wall time of the last message [s, monotonic].
+
+    Raises:
+        UserError: The station or a parameter is wrong.
+    """
+
+    def __init__(self, kind: NodeKind, **options: Any) -> None:
+        super().__init__(kind.name, **options)
+        self._kind = kind
+        self._table: list[Parameter] = list(NODE_PARAMETERS)
+        self._values = declare(self, self._table)
+        self._document = base_document(str(self._values["station"]), kind.roles)
+        instruments = station_table(self._document, changeable=True)
+        self._values |= declare(self, instruments)
+        self._table += instruments
+        self._restarts = 0
+        self.station = self._station(self._values)
+        require(self.station, kind.needs, kind.name)
+        self._show_effective_values(instruments)
+        self._estimator = make_estimator(self.station, self._settings(self._values))
+        self._inputs = EstimatorInputs(self.station, self._estimator, self._now)
+        platform = self.station.platform
+        declination = None if platform is None else platform.magnetic_declination_deg
+        self._outputs = WindPublishers(self, declination)
+        self._apply_publishing()
+        self.received_at = time.monotonic()
+        self._last_estimate: WindEstimate | None = None
+        for source in self._inputs.sources():
+            subscribe(
+                self,
+                source.message_type,
+                source.topic,
+                self._receiver(source.receive),
+                input_quality(
+                    reliable=bool(self._values["reliable_inputs"]),
+                    depth=int(_number(self._values["input_depth"])),
+                ),
+            )
+        self._updater = Updater(
+            self,
+            [self._health, self._inputs.statuses],
+            period=_number(self._values["diagnostics_period"]),
+        )
+        self._idle_timer = self.create_timer(
+            _IDLE_CHECK, self._while_silent, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+
+    @property
+    def last_wind(self) -> str:
+        """The last estimate as text for people; empty before the first."""
+        if self._last_estimate is None:
+            return ""
+        east, north, _ = self._last_estimate.velocity
+        deviation = float(np.sqrt(0.5 * np.trace(self._last_estimate.covariance[:2, :2])))
+        bearing = float(direction_from_deg(self._last_estimate.velocity))
+        return f"{np.hypot(east, north):5.1f} m/s ± {deviation:.1f} from {bearing:03.0f}°"
+
+    def _station(self, values: dict[str, Value]) -> Station:
+        return station_with(
+            self._document, values, f"parameters of {self.get_fully_qualified_name()}"
+        )
+
+    @staticmethod
+    def _settings(values: dict[str, Value]) -> EstimatorSettings:
+        names = {field.name for field in dataclasses.fields(EstimatorSettings)}
+        chosen: dict[str, Any] = {name: values[name] for name in names if name in values}
+        return EstimatorSettings(**chosen)
+
+    def _show_effective_values(self, instruments: Sequence[Parameter]) -> None:
+        """Let `ros2 param get` show the constants that a file or a profile stated."""
+        shown = [
+            RosParameter(p.name, value=value)
+            for p in instruments
+            if self._values[p.name] is None
+            and p.changeable
+            and (value := effective_value(self.station, p.name)) not in (None, [])
+        ]
+        self.set_parameters(shown)
+
+    def _now(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+    def _receiver(self, receive: Any) -> Any:
+        def received(message: Any) -> None:
+            self.received_at = time.monotonic()
+            receive(message)
+            self._publish()
+
+        return received
+
+    def _publish(self) -> None:
+        estimates = self._estimator.take_estimates()
+        if estimates:
+            self._last_estimate = estimates[-1]
+            self._outputs.publish_estimates(estimates)
+            for window in self._estimator.take_windows():
+                self._outputs.publish_window(window)
+
+    def _while_silent(self) -> None:
+        """Only when every input is silent may the clock speak: stamps alone rule otherwise."""
+        if time.monotonic() - self.received_at < _number(self._values["silence"]):
+            return
+        now = self._now()
+        if now > 0:
+            self._estimator.advance(now)
+            self._publish()
+
+    def _health(self) -> Iterable[Status]:
+        for item in self._estimator.health():
+            yield Status(item.name, Level(item.level), item.message, item.values)
+        yield Status(
+            "settings",
+            Level.OK,
+            f"Method {self._values['method']}.",
+            {"restarts by parameter changes": str(self._restarts)},
+        )
+
+    def _apply_publishing(self) -> None:
+        publishers, values = self._outputs, self._values
+        publishers.frame_id = str(values["frame_id"])
+        publishers.sensor_frame_id = str(values["sensor_frame_id"])
+        publishers.nmea_talker = str(values["nmea_talker"]) if values["nmea"] else ""
+        publishers.nmea_period = round(_SECOND / _number(values["nmea_rate"]))
+
+    def _on_set_parameters(self, parameters: Sequence[RosParameter]) -> SetParametersResult:
+        requested = {parameter.name: parameter.value for parameter in parameters}
+        try:
+            values = changed(self._table, self._values, requested)
+            station, settings = self._station(values), self._settings(values)
+            if station != self.station or settings != self._settings(self._values):
+                # What was learnt belongs to the old constants, so the estimator starts afresh.
+                self._estimator = make_estimator(station, settings)
+                self._inputs.estimator = self._estimator
+                self.station = station
+                self._restarts += 1
+        except (ValueError, UserError) as problem:
+            return SetParametersResult(successful=False, reason=str(problem))
+        self._values = values
+        self._apply_publishing()
+        return SetParametersResult(successful=True)
+
+    def finish(self) -> None:
+        """Publish what the estimator still holds; call it when no more messages will come."""
+        self._estimator.flush()
+        self._publish()
+
+
+def _number(value: Value) -> float:
+    if not isinstance(value, (int, float)):
+        raise TypeError(f"{value!r} is not a number")
+    return float(value)
+
+
+def build(kind: NodeKind, arguments: Sequence[str]) -> list[Node]:
+    """The node of an executable; prints help and leaves with `--help`.
+
+    Args:
+        kind: Which node.
+        arguments: Command line without the program's name.
+    """
+    parser = argparse.ArgumentParser(
+        prog=kind.name,
+        description=kind.purpose,
+        epilog=_manual(kind),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.parse_args(remove_ros_args([kind.name, *arguments])[1:])
+    return [EstimatorNode(kind)]
+
+
+def _manual(kind: NodeKind) -> str:
+    instruments = station_table(base_document("", kind.roles), changeable=True)
+    outputs = "\n".join(f"  {topic}\n      {text}" for topic, text in TOPICS.items())
+    inputs = "\n".join(
+        f"  {parameter.name}\n      {kind_of.keys[key]['topic']}"
+        for kind_of in kind.roles
+        for key in kind_of.keys
+        if isinstance(kind_of.keys[key], dict) and "topic" in kind_of.keys[key]
+        for parameter in instruments
+        if parameter.name == f"{kind_of.name}.{key}.topic"
+    )
+    return (
+        f"input topics (parameter, default without a station file):\n{inputs}\n\n"
+        f"output topics:\n{outputs}\n\n"
+        f"parameters (--ros-args -p NAME:=VALUE):\n{describe(NODE_PARAMETERS)}\n\n"
+        "parameters of the instruments (unset: the station file's, the profile's or the "
+        f"schema's value; named after the station file's instruments):\n{describe(instruments)}"
+    )

@@ -1,0 +1,334 @@
+"""Messages of a station's inputs become calls of its estimator.
+
+What a message means is decided in `station.inputs`, for single messages here and for whole bags in
+`recordings`, so that live and offline the estimator sees the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from wind_sensors.errors import UserError
+from wind_sensors.nodes.diagnostics import Level, Status
+from wind_sensors.nodes.platform import ImuWithTwist, odometry_state
+from wind_sensors.station.inputs import (
+    FieldPath,
+    TurnCounter,
+    angle_inputs,
+    angles_from_raw,
+    field_path,
+    field_value,
+    resolved,
+    scaled,
+)
+from wind_sensors.station.model import Cup, Input, Propeller, Station
+
+if TYPE_CHECKING:
+    from wind_sensors.estimation.streaming import StreamingEstimator
+
+Handler = Callable[[Any, int], None]
+
+_SECOND = 1_000_000_000
+
+
+class Source(NamedTuple):
+    """One topic to subscribe to.
+
+    Attributes:
+        topic: As the station file names it.
+        message_type: The message class.
+        receive: To be called with each message.
+    """
+
+    topic: str
+    message_type: type[Any]
+    receive: Callable[[Any], None]
+
+
+@dataclass
+class TopicCount:
+    """What happened to the messages of one topic."""
+
+    received: int = 0
+    without_stamp: int = 0
+    not_numbers: int = 0
+    unusable: int = 0
+    problem: str = ""
+    purposes: list[str] = field(default_factory=list)
+
+
+def message_class(name: str) -> type[Any]:
+    """The class of a ROS message type such as `std_msgs/msg/Header`.
+
+    Raises:
+        UserError: The package or the message is not installed.
+    """
+    package, _, short = name.replace("/msg/", "/").partition("/")
+    try:
+        found: type[Any] = getattr(import_module(f"{package}.msg"), short)
+    except (ImportError, AttributeError):
+        raise UserError(
+            f"the message type {name} is not installed.",
+            remedy=f"Install the ROS package {package}, or name another type in the station file.",
+        ) from None
+    return found
+
+
+def nanoseconds(stamp: Any) -> int:
+    """A builtin_interfaces/Time as nanoseconds."""
+    return int(stamp.sec) * _SECOND + int(stamp.nanosec)
+
+
+class EstimatorInputs:
+    """Subscriptions of one station and the way from their messages to an estimator.
+
+    Args:
+        station: The station.
+        now: The node's clock [ns]; stands in where a message has no stamp.
+
+    Attributes:
+        estimator: Gets the measurements; may be replaced at any time.
+        counts: By topic.
+
+    Raises:
+        UserError: A message type is not installed, or has no such field.
+    """
+
+    def __init__(
+        self, station: Station, estimator: StreamingEstimator, now: Callable[[], int]
+    ) -> None:
+        self.estimator = estimator
+        self.counts: dict[str, TopicCount] = defaultdict(TopicCount)
+        self._now = now
+        self._handlers: dict[str, list[Handler]] = defaultdict(list)
+        self._types: dict[str, str] = {}
+        self._add_instruments(station)
+        self._add_air(station)
+        self._add_platform(station)
+
+    def sources(self) -> list[Source]:
+        """The topics to subscribe to."""
+        return [
+            Source(topic, message_class(self._types[topic]), self._receiver(topic))
+            for topic in self._handlers
+        ]
+
+    def statuses(self) -> Iterable[Status]:
+        """What was wrong with the messages themselves, topic by topic."""
+        for topic, count in self.counts.items():
+            complaints = [
+                f"{number} {what}"
+                for number, what in (
+                    (count.without_stamp, "without a stamp"),
+                    (count.not_numbers, "not a number"),
+                    (count.unusable, f"unusable ({count.problem})"),
+                )
+                if number
+            ]
+            if not count.received:
+                level, message = Level.WARN, "No messages yet: is the topic name right?"
+            elif complaints:
+                level = Level.ERROR if count.unusable else Level.WARN
+                message = f"{', '.join(complaints)} of {count.received} messages were left out."
+            else:
+                level, message = Level.OK, "Messages are arriving."
+            yield Status(
+                f"topic {topic}",
+                level,
+                message,
+                {
+                    "purpose": ", ".join(count.purposes),
+                    "received": str(count.received),
+                    "without stamp": str(count.without_stamp),
+                    "not numbers": str(count.not_numbers),
+                    "unusable": str(count.unusable),
+                },
+            )
+
+    def _add(self, source: Input, purpose: str, handler: Handler) -> None:
+        known = self._types.setdefault(source.topic, source.type)
+        if known != source.type:
+            raise UserError(
+                f"two inputs name {source.topic}, one as {known}, one as {source.type}.",
+                remedy="Give both the same type, or each its own topic.",
+            )
+        self.counts[source.topic].purposes.append(purpose)
+        self._handlers[source.topic].append(handler)
+
+    def _receiver(self, topic: str) -> Callable[[Any], None]:
+        handlers = self._handlers[topic]
+        count = self.counts[topic]
+        is_header = self._types[topic] == "std_msgs/msg/Header"
+
+        def receive(message: Any) -> None:
+            count.received += 1
+            header = message if is_header else getattr(message, "header", None)
+            stamp = 0 if header is None else nanoseconds(header.stamp)
+            try:
+                for handler in handlers:
+                    handler(message, stamp)
+            except (AttributeError, IndexError, TypeError, ValueError) as problem:
+                count.unusable += 1
+                count.problem = str(problem)
+
+        return receive
+
+    def _add_instruments(self, station: Station) -> None:
+        for instrument in station.instruments:
+            if isinstance(instrument, (Cup, Propeller)):
+                source = resolved(instrument.pulses, "pulses")
+                self._add(source, f"pulses of {instrument.name}", self._rotor(source, instrument))
+            else:
+                for signal, source in angle_inputs(instrument).items():
+                    self._add(source, f"angle of {signal}", self._angle(source, signal))
+
+    def _rotor(self, source: Input, rotor: Cup | Propeller) -> Handler:
+        path = _checked_path(source)
+        count = self.counts[source.topic]
+        name = rotor.name
+
+        def edge(message: Any, stamp: int) -> None:
+            time = nanoseconds(field_value(message, path))
+            if time == 0:
+                count.without_stamp += 1
+            else:
+                self.estimator.add_pulse(name, time)
+
+        def edges(message: Any, stamp: int) -> None:
+            for time in field_value(message, path):
+                self.estimator.add_pulse(name, int(time))
+
+        counter = TurnCounter(source, rotor)
+
+        def turns(message: Any, stamp: int) -> None:
+            time = stamp or self._now()
+            reading = counter.add(time, float(field_value(message, path)))
+            if reading is None:
+                count.not_numbers += 1
+            else:
+                self.estimator.add_pulse(name, time, reading.turns)
+
+        return {"edge": edge, "edges": edges}.get(source.meaning, turns)
+
+    def _angle(self, source: Input, signal: str) -> Handler:
+        number = self._number(source)
+
+        def angle(message: Any, stamp: int) -> None:
+            raw = number(message)
+            if raw is not None:
+                reading = float(angles_from_raw(source, raw)[0])
+                self.estimator.add_angle(signal, stamp or self._now(), reading)
+
+        return angle
+
+    def _add_air(self, station: Station) -> None:
+        if station.air.temperature is not None:
+            source = resolved(station.air.temperature, "temperature")
+            self._add(source, "air temperature", self._temperature(source))
+        if station.air.pressure is not None:
+            source = resolved(station.air.pressure, "pressure")
+            self._add(source, "air pressure", self._pressure(source))
+
+    def _temperature(self, source: Input) -> Handler:
+        number = self._number(source)
+
+        def temperature(message: Any, stamp: int) -> None:
+            raw = number(message)
+            if raw is not None:
+                value = float(scaled(source, raw)[0])
+                self.estimator.add_air(stamp or self._now(), temperature=value)
+
+        return temperature
+
+    def _pressure(self, source: Input) -> Handler:
+        number = self._number(source)
+
+        def pressure(message: Any, stamp: int) -> None:
+            raw = number(message)
+            if raw is not None:
+                value = float(scaled(source, raw)[0])
+                self.estimator.add_air(stamp or self._now(), pressure=value)
+
+        return pressure
+
+    def _number(self, source: Input) -> Callable[[Any], np.ndarray[Any, Any] | None]:
+        path = _checked_path(source)
+        count = self.counts[source.topic]
+
+        def number(message: Any) -> np.ndarray[Any, Any] | None:
+            value = float(field_value(message, path))
+            if not np.isfinite(value):
+                count.not_numbers += 1
+                return None
+            return np.array([value])
+
+        return number
+
+    def _add_platform(self, station: Station) -> None:
+        platform = station.platform
+        if platform is None:
+            return
+        if platform.odometry is not None:
+            source = resolved(platform.odometry, "odometry")
+            self._add(source, "platform", self._odometry(source))
+        elif platform.imu is not None:
+            imu = resolved(platform.imu, "imu")
+            fusion = ImuWithTwist(waits=platform.twist is not None)
+            self._add(imu, "platform attitude", self._imu(imu, fusion))
+            if platform.twist is not None:
+                twist = resolved(platform.twist, "twist")
+                self._add(twist, "platform velocity", self._twist(fusion))
+
+    def _odometry(self, source: Input) -> Handler:
+        count = self.counts[source.topic]
+
+        def odometry(message: Any, stamp: int) -> None:
+            state = odometry_state(message, stamp or self._now())
+            if state is None:
+                count.not_numbers += 1
+            else:
+                self.estimator.add_platform(*state)
+
+        return odometry
+
+    def _imu(self, source: Input, fusion: ImuWithTwist) -> Handler:
+        count = self.counts[source.topic]
+
+        def imu(message: Any, stamp: int) -> None:
+            if not fusion.add_imu(message, stamp or self._now()):
+                count.not_numbers += 1
+            for state in fusion.ready():
+                self.estimator.add_platform(*state)
+
+        return imu
+
+    def _twist(self, fusion: ImuWithTwist) -> Handler:
+        def twist(message: Any, stamp: int) -> None:
+            fusion.add_twist(message, stamp or self._now())
+            for state in fusion.ready():
+                self.estimator.add_platform(*state)
+
+        return twist
+
+
+def _checked_path(source: Input) -> FieldPath:
+    """The field's path, tried on an empty message as far as its arrays allow."""
+    path = field_path(source.field)
+    try:
+        field_value(message_class(source.type)(), path)
+    except IndexError:
+        # The arrays of an empty message have no elements yet.
+        pass
+    except (AttributeError, TypeError):
+        raise UserError(
+            f"{source.type} has no field '{source.field}'.",
+            where=source.topic,
+            remedy="Name a numeric field of it, e.g. `position[0]` or `data`.",
+        ) from None
+    return path

@@ -1,0 +1,144 @@
+"""Estimates and window statistics as the output topics of a station."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TwistWithCovarianceStamped, Vector3Stamped
+from std_msgs.msg import Float64, String
+
+from wind_sensors.motion.frames import direction_from_deg
+from wind_sensors.nodes.nmea import apparent_wind_sentence, true_wind_sentence
+from wind_sensors.nodes.quality import advertise, output_quality
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+    from rclpy.publisher import Publisher
+
+    from wind_sensors.estimation.outputs import WindEstimate, WindowStatistics
+    from wind_sensors.station.signals import FloatArray
+
+_SECOND = 1_000_000_000
+
+TOPICS: dict[str, str] = {
+    "wind": "TwistWithCovarianceStamped: corrected wind velocity, where the air goes, ENU",
+    "wind/apparent": "TwistWithCovarianceStamped: wind minus sensor velocity, sensor frame",
+    "wind/vector": "Vector3Stamped: `wind` without covariance, for plots",
+    "wind/mean": "TwistWithCovarianceStamped: corrected vector mean of each window",
+    "wind/speed": "Float64: corrected scalar mean speed of each window [m/s]",
+    "wind/direction_from": "Float64: where the mean wind comes from [deg clockwise from north]",
+    "wind/direction_variance": "Float64: of each window, corrected for the vane [rad^2]",
+    "wind/bias": "TwistWithCovarianceStamped: velocity removed from the raw mean",
+    "wind/bias/<term>": "Float64: one relative term of it (u, v, w, vane_lag, ...)",
+    "wind/nmea": "String: NMEA 0183 MWV and MWD sentences (with parameter nmea)",
+    "/diagnostics": "DiagnosticArray: health of every input and of the estimate",
+}
+"""Output topics of an estimator node, relative to its namespace."""
+
+
+def stamp(nanoseconds: int) -> Time:
+    """Nanoseconds as a message."""
+    return Time(sec=nanoseconds // _SECOND, nanosec=nanoseconds % _SECOND)
+
+
+class WindPublishers:
+    """Publishes what an estimator delivers; messages are stamped with the time the wind blew.
+
+    Args:
+        node: Its namespace is the station's.
+        declination_deg: Magnetic declination for NMEA sentences; None where it is not known.
+
+    Attributes:
+        frame_id: Of earth-fixed vectors.
+        sensor_frame_id: Of the apparent wind.
+        nmea_talker: Two letters; empty: no sentences.
+        nmea_period: Between sentences [ns].
+    """
+
+    def __init__(self, node: Node, declination_deg: float | None) -> None:
+        self.frame_id = "map"
+        self.sensor_frame_id = "wind_sensor"
+        self.nmea_talker = ""
+        self.nmea_period = _SECOND
+        self._node = node
+        self._declination_deg = declination_deg
+        twist = TwistWithCovarianceStamped
+        self._wind = self._advertise(twist, "wind")
+        self._apparent = self._advertise(twist, "wind/apparent")
+        self._vector = self._advertise(Vector3Stamped, "wind/vector")
+        self._mean = self._advertise(twist, "wind/mean")
+        self._speed = self._advertise(Float64, "wind/speed")
+        self._direction = self._advertise(Float64, "wind/direction_from")
+        self._variance = self._advertise(Float64, "wind/direction_variance")
+        self._bias = self._advertise(twist, "wind/bias")
+        self._terms: dict[str, Publisher] = {}
+        self._nmea: Publisher | None = None
+        self._last_sentence: int | None = None
+
+    def _advertise(self, message_type: type[Any], topic: str) -> Publisher:
+        return advertise(self._node, message_type, topic, output_quality())
+
+    def publish_estimates(self, estimates: Iterable[WindEstimate]) -> None:
+        """`wind`, `wind/apparent`, `wind/vector` and NMEA sentences."""
+        for estimate in estimates:
+            time = stamp(estimate.time)
+            self._wind.publish(_twist(time, self.frame_id, estimate.velocity, estimate.covariance))
+            self._apparent.publish(
+                _twist(time, self.sensor_frame_id, estimate.apparent, estimate.apparent_covariance)
+            )
+            vector = Vector3Stamped()
+            vector.header.stamp = time
+            vector.header.frame_id = self.frame_id
+            _fill(vector.vector, estimate.velocity)
+            self._vector.publish(vector)
+            if self.nmea_talker:
+                self._publish_sentences(estimate)
+
+    def publish_window(self, window: WindowStatistics) -> None:
+        """`wind/mean` and the other topics of a finished averaging window."""
+        time = stamp(window.stop)
+        self._mean.publish(
+            _twist(time, self.frame_id, window.vector_mean, window.vector_mean_covariance)
+        )
+        self._bias.publish(_twist(time, self.frame_id, window.bias, window.bias_covariance))
+        self._speed.publish(Float64(data=float(window.scalar_mean)))
+        self._direction.publish(Float64(data=float(direction_from_deg(window.vector_mean))))
+        self._variance.publish(Float64(data=float(window.corrected_direction_variance)))
+        for name, term in window.bias_terms.items():
+            if name not in self._terms:
+                self._terms[name] = self._advertise(Float64, f"wind/bias/{name}")
+            self._terms[name].publish(Float64(data=float(term.value)))
+
+    def _publish_sentences(self, estimate: WindEstimate) -> None:
+        last = self._last_sentence
+        if last is not None and 0 <= estimate.time - last < self.nmea_period:
+            return
+        self._last_sentence = estimate.time
+        if self._nmea is None:
+            self._nmea = self._advertise(String, "wind/nmea")
+        talker = self.nmea_talker
+        for text in (
+            apparent_wind_sentence(estimate.apparent, talker),
+            true_wind_sentence(estimate.velocity, self._declination_deg, talker),
+        ):
+            self._nmea.publish(String(data=text))
+
+
+def _twist(
+    time: Time, frame_id: str, velocity: FloatArray, covariance: FloatArray
+) -> TwistWithCovarianceStamped:
+    message = TwistWithCovarianceStamped()
+    message.header.stamp = time
+    message.header.frame_id = frame_id
+    _fill(message.twist.twist.linear, velocity)
+    full = np.zeros((6, 6))
+    full[:3, :3] = covariance
+    message.twist.covariance = full.reshape(36)
+    return message
+
+
+def _fill(vector: Any, values: FloatArray) -> None:
+    vector.x, vector.y, vector.z = float(values[0]), float(values[1]), float(values[2])

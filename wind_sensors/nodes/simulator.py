@@ -1,0 +1,248 @@
+"""The simulator's node: events of a simulated station, published when they arrive."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from wind_sensors.nodes.diagnostics import Level, Status, Updater
+from wind_sensors.nodes.outputs import stamp
+from wind_sensors.nodes.parameters import Parameter, Value, declare, describe
+from wind_sensors.nodes.quality import advertise, output_quality
+from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
+from wind_sensors.nodes.signal_messages import TRUTH_TOPIC, SignalEncoder
+from wind_sensors.nodes.station_parameters import (
+    STATION,
+    base_document,
+    station_table,
+    station_with,
+)
+from wind_sensors.simulation.run import SignalStream, recording_start
+from wind_sensors.simulation.transport import Event, live_events
+
+if TYPE_CHECKING:
+    from wind_sensors.station.model import Station
+
+NAME = "sim_node"
+
+NODE_PARAMETERS: tuple[Parameter, ...] = (
+    replace(
+        STATION,
+        default="mast_cup_vane",
+        description="Station file, or the name of a configuration that ships with the package.",
+    ),
+    Parameter(
+        "duration",
+        float,
+        0.0,
+        "Simulated seconds until the signals end [s]; 0: they go on.",
+        minimum=0.0,
+    ),
+    Parameter(
+        "speed",
+        float,
+        1.0,
+        "Simulated seconds per second of wall time.",
+        minimum=0.01,
+        maximum=1000.0,
+    ),
+    Parameter(
+        "publish_clock",
+        bool,
+        False,
+        "Publish simulated time on /clock, starting at the station file's recording.start; "
+        "without it the signals are stamped from now on.",
+    ),
+    Parameter("publish_truth", bool, False, f"Publish the true wind on {TRUTH_TOPIC}."),
+    Parameter(
+        "wait_for_subscribers",
+        int,
+        0,
+        "Begin when each raw topic has so many subscribers.",
+        minimum=0,
+        maximum=100,
+    ),
+    Parameter("frame_id", str, "map", "Frame of earth-fixed vectors: east, north, up."),
+    Parameter(
+        "output_depth",
+        int,
+        1000,
+        "Messages kept for slow subscribers.",
+        minimum=1,
+        maximum=1_000_000,
+    ),
+    Parameter(
+        "diagnostics_period", float, 1.0, "Between diagnostics [s].", minimum=0.05, maximum=60.0
+    ),
+    *SCENARIO_PARAMETERS,
+)
+"""Parameters of the simulator, besides those of its instruments."""
+
+_TICK = 0.002
+_CLOCK_WALL_PERIOD = 10_000_000
+_SECOND = 1_000_000_000
+
+
+class SimulatorNode(Node):
+    """Publishes the raw signals of a simulated station.
+
+    Same station, scenario and seed: the same signals to the bit as `wind simulate`.
+
+    Args:
+        options: Further arguments of rclpy's Node.
+
+    Attributes:
+        finished: `duration` has passed and everything has been published.
+        published: Messages so far.
+
+    Raises:
+        UserError: The station or a parameter is wrong.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(NAME, **options)
+        values = declare(self, NODE_PARAMETERS)
+        document = base_document(str(values["station"]), ())
+        instruments = declare(self, station_table(document, changeable=False))
+        where = f"parameters of {self.get_fully_qualified_name()}"
+        self.station: Station = station_with(document, instruments, where)
+        self.finished = False
+        self.published = 0
+        self._speed = _number(values["speed"])
+        self._waits_for = int(_number(values["wait_for_subscribers"]))
+        self._with_clock = bool(values["publish_clock"])
+        self._duration = _number(values["duration"]) or math.inf
+        self._scenario = scenario_of(values, self.station)
+        self._begin = 0
+        encoder = SignalEncoder(
+            self.station, str(values["frame_id"]), with_truth=bool(values["publish_truth"])
+        )
+        self._encoder = encoder
+        depth = int(_number(values["output_depth"]))
+        self._outlets = {
+            topic: advertise(self, message_type, topic, output_quality(depth))
+            for topic, message_type in encoder.topics.items()
+        }
+        self._clock_outlet = (
+            advertise(self, ClockMessage, "/clock", output_quality(1)) if self._with_clock else None
+        )
+        self._clock_period = max(round(_CLOCK_WALL_PERIOD * self._speed), 1)
+        self._next_clock = 0
+        # A first look compiles the kernels, which must not delay the stream once it runs.
+        self._events: Iterator[Event] = live_events(SignalStream(self.station, self._scenario))
+        self._next_event = next(self._events)
+        self._started: float | None = None
+        self._late = 0.0
+        self._timer = self.create_timer(
+            _TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._updater = Updater(self, [self._status], period=_number(values["diagnostics_period"]))
+
+    @property
+    def elapsed(self) -> float:
+        """Simulated time since the start [s]."""
+        if self._started is None:
+            return 0.0
+        return min((time.monotonic() - self._started) * self._speed, self._duration)
+
+    def _tick(self) -> None:
+        if self.finished or not self._has_started():
+            return
+        now = self._begin + round(self.elapsed * 1e9)
+        while self._next_event.arrival <= now:
+            event = self._next_event
+            if event.arrival >= self._begin + self._duration * 1e9:
+                break
+            self._tell_time(event.arrival)
+            for topic, message in self._encoder.encode(event):
+                self._outlets[topic].publish(message)
+                self.published += 1
+            self._next_event = next(self._events)
+        self._tell_time(now)
+        passed = self._begin + round(self.elapsed * 1e9)
+        self._late = (passed - now) * 1e-9 / self._speed
+        if self.elapsed >= self._duration:
+            self.finished = True
+            self.get_logger().info(f"The simulation has ended: {self.published} messages.")
+
+    def _has_started(self) -> bool:
+        if self._started is None:
+            outlets = self._outlets.values()
+            if all(o.get_subscription_count() >= self._waits_for for o in outlets):
+                self._start()
+        return self._started is not None
+
+    def _start(self) -> None:
+        self._begin = recording_start(self.station) if self._with_clock else time.time_ns()
+        self._events = live_events(SignalStream(self.station, self._scenario, self._begin))
+        self._next_event = next(self._events)
+        self._next_clock = self._begin
+        self._started = time.monotonic()
+
+    def _tell_time(self, now: int) -> None:
+        if self._clock_outlet is not None and now >= self._next_clock:
+            self._clock_outlet.publish(ClockMessage(clock=stamp(now)))
+            self._next_clock = now + self._clock_period
+
+    def _status(self) -> Iterable[Status]:
+        details = {
+            "simulated time": f"{self.elapsed:.1f} s",
+            "messages": str(self.published),
+            "speed": f"{self._speed:g}",
+            "time spent in the last burst": f"{self._late * 1e3:.1f} ms",
+        }
+        if self._started is None:
+            missing = [
+                topic
+                for topic, outlet in self._outlets.items()
+                if outlet.get_subscription_count() < self._waits_for
+            ]
+            text = f"Waiting for subscribers of {', '.join(sorted(missing))}."
+            yield Status("simulation", Level.WARN, text, details)
+        elif self.finished:
+            yield Status("simulation", Level.OK, "The simulation has ended.", details)
+        else:
+            yield Status("simulation", Level.OK, "Signals are being published.", details)
+
+
+def _number(value: Value) -> float:
+    if not isinstance(value, (int, float)):
+        raise TypeError(f"{value!r} is not a number")
+    return float(value)
+
+
+def build(arguments: Sequence[str]) -> list[Node]:
+    """The node of the executable; prints help and leaves with `--help`."""
+    parser = argparse.ArgumentParser(
+        prog=NAME,
+        description="The signals of a simulated station as live topics: pulses one by one at "
+        "their own times, angles, reference wind, air and platform, with the faults of the "
+        "instruments (station file) and of the transport (faults.*).",
+        epilog=_manual(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.parse_args(remove_ros_args([NAME, *arguments])[1:])
+    return [SimulatorNode()]
+
+
+def _manual() -> str:
+    example = station_table(
+        {"instruments": [{"name": "cup", "kind": "cup"}, {"name": "vane", "kind": "vane"}]},
+        changeable=False,
+    )
+    return (
+        "output topics: the inputs that the station file names (raw signals, reference, air, "
+        f"platform), {TRUTH_TOPIC} and /clock where asked for, /diagnostics\n\n"
+        f"parameters (--ros-args -p NAME:=VALUE):\n{describe(NODE_PARAMETERS)}\n\n"
+        "parameters of the instruments, here for a cup and a vane (unset: the station file's "
+        f"value):\n{describe(example)}"
+    )
