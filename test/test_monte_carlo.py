@@ -7,7 +7,8 @@ import pytest
 from wind_sensors.instruments import rotor_family
 from wind_sensors.instruments.dynamics.rotor import CUP_EQUIVALENT, CUP_KRISTENSEN_1994
 from wind_sensors.report import monte_carlo
-from wind_sensors.report.monte_carlo import Case, rotor, run_monte_carlo
+from wind_sensors.report.monte_carlo import run_monte_carlo
+from wind_sensors.report.monte_carlo_cases import Case, rotor, standard_cases
 
 
 def test_two_cups_at_three_intensities() -> None:
@@ -32,7 +33,7 @@ def test_two_cups_at_three_intensities() -> None:
 
 def test_a_wrong_formula_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the cross term of u and w the correlated case must fall outside."""
-    case = next(c for c in monte_carlo.standard_cases() if c.correlation != 0.0)
+    case = next(c for c in standard_cases() if c.correlation != 0.0)
     assert run_monte_carlo(pairs=12, cases=[case])[0].passed
     realised = monte_carlo._realised
 
@@ -46,7 +47,7 @@ def test_a_wrong_formula_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_propellers_and_vanes_in_a_short_run() -> None:
-    cases = [c for c in monte_carlo.standard_cases() if "prop" in c.name or "vector" in c.name]
+    cases = [c for c in standard_cases() if "prop" in c.name or "vector" in c.name]
     rows = run_monte_carlo(pairs=6, seed=3, cases=cases)
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
     axial = [row for row in rows if row.case.startswith("K94")]
@@ -55,7 +56,7 @@ def test_propellers_and_vanes_in_a_short_run() -> None:
 
 
 def test_the_same_seed_gives_the_same_table() -> None:
-    case = monte_carlo.standard_cases()[0]
+    case = standard_cases()[0]
     first = run_monte_carlo(pairs=2, seed=5, cases=[case])
     second = run_monte_carlo(pairs=2, seed=5, cases=[case])
     assert first == second
