@@ -108,11 +108,7 @@ def test_edges_come_when_a_fine_integration_says(harmonic):
     edges = edges[np.r_[True, np.diff(edges) > 1e-6]]
     assert abs(len(found) - len(edges)) <= 1
     both = min(len(found), len(edges))
-    # The integration itself is good to a few parts in 1e5 of the turn; intervals tell the
-    # crossings apart from it.
-    intervals = np.abs(np.diff(found[:both]) - np.diff(edges[:both]))
-    assert np.median(intervals) < 1e-6
-    assert np.abs(found[:both] - edges[:both]).max() < 2e-4
+    assert np.abs(found[:both] - edges[:both]).max() < 1e-6
 
 
 def test_the_interpolant_is_inverted_to_a_nanosecond():

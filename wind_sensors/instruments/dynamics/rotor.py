@@ -248,7 +248,7 @@ def advance_forced(
     a_0, b_0, e_0, lateral_0 = start
     a_1, b_1, e_1, lateral_1 = stop
     fastest = density_ratio * max(abs(b_0), abs(b_1), abs(a_0), abs(a_1), abs(y))
-    substeps = 1 + int(2.5 * dt * fastest / (p.distance_constant * p.inertia_factor))
+    substeps = 1 + int(6.0 * dt * fastest / (p.distance_constant * p.inertia_factor))
     if p.torque_harmonic != 0.0:
         substeps = max(substeps, 1 + int(1.5 * dt * abs(y) / p.calibration_distance))
     step = dt / substeps

@@ -48,22 +48,31 @@ def vane_acceleration(
     p: VaneParameters,
     phi: float,
     phi_rate: float,
-    alpha: float,
-    h: float,
+    wind_x: float,
+    wind_y: float,
     yaw_rate: float,
     yaw_acceleration: float,
     gravity_x: float,
     gravity_y: float,
     density_ratio: float,
 ) -> float:
-    """phi'' [rad/s^2] without friction; see the module's text for the terms."""
-    omega = h / p.distance_constant
-    stiffness = density_ratio / p.inertia_factor
-    restoring = stiffness * omega * omega * math.sin(phi - alpha - p.aerodynamic_offset)
-    damping = 2.0 * p.damping_ratio * p.damping_factor * stiffness * omega * (phi_rate + yaw_rate)
-    gravity = (
-        p.imbalance / p.inertia_factor * (-gravity_x * math.sin(phi) + gravity_y * math.cos(phi))
-    )
+    """phi'' [rad/s^2] without friction; see the module's text for the terms.
+
+    The restoring term is written as h (h sin(phi - alpha)), which needs no direction of the wind.
+    """
+    h = math.sqrt(wind_x * wind_x + wind_y * wind_y)
+    pace = density_ratio / p.inertia_factor * h / p.distance_constant
+    balanced = phi - p.aerodynamic_offset
+    across = wind_y * math.cos(balanced) - wind_x * math.sin(balanced)
+    restoring = pace * across / p.distance_constant
+    damping = 2.0 * p.damping_ratio * p.damping_factor * pace * (phi_rate + yaw_rate)
+    gravity = 0.0
+    if p.imbalance != 0.0:
+        gravity = (
+            p.imbalance
+            / p.inertia_factor
+            * (-gravity_x * math.sin(phi) + gravity_y * math.cos(phi))
+        )
     return -damping - restoring - yaw_acceleration + gravity
 
 
@@ -104,17 +113,21 @@ def advance_vane(
     yaw_acceleration = (yaw_rate[1] - yaw_rate[0]) / dt
     friction = p.friction / (p.distance_constant * p.distance_constant * p.inertia_factor)
     for k in range(substeps):
+        f_0 = k / substeps
         f_h = (k + 0.5) / substeps
+        f_1 = (k + 1.0) / substeps
+        x_0 = wind_x[0] + f_0 * (wind_x[1] - wind_x[0])
+        y_0 = wind_y[0] + f_0 * (wind_y[1] - wind_y[0])
         x_h = wind_x[0] + f_h * (wind_x[1] - wind_x[0])
         y_h = wind_y[0] + f_h * (wind_y[1] - wind_y[0])
-        h = math.hypot(x_h, y_h)
-        alpha = math.atan2(-y_h, -x_h)
-        turn = yaw_rate[0] + f_h * (yaw_rate[1] - yaw_rate[0])
-        # Between the substep's ends the wind is held at its middle: second order in the step, and
-        # one evaluation of the wind's direction for the four stages.
+        x_1 = wind_x[0] + f_1 * (wind_x[1] - wind_x[0])
+        y_1 = wind_y[0] + f_1 * (wind_y[1] - wind_y[0])
+        turn_0 = yaw_rate[0] + f_0 * (yaw_rate[1] - yaw_rate[0])
+        turn_h = yaw_rate[0] + f_h * (yaw_rate[1] - yaw_rate[0])
+        turn_1 = yaw_rate[0] + f_1 * (yaw_rate[1] - yaw_rate[0])
         drag = 0.0
         drive = vane_acceleration(
-            p, phi, phi_rate, alpha, h, turn, yaw_acceleration, gravity[0], gravity[1],
+            p, phi, phi_rate, x_0, y_0, turn_0, yaw_acceleration, gravity[0], gravity[1],
             density_ratio,
         )  # fmt: skip
         if friction > 0.0:
@@ -127,17 +140,17 @@ def advance_vane(
         k_1 = drive + drag
         v_2 = phi_rate + 0.5 * step * k_1
         k_2 = drag + vane_acceleration(
-            p, phi + 0.5 * step * phi_rate, v_2, alpha, h, turn, yaw_acceleration,
+            p, phi + 0.5 * step * phi_rate, v_2, x_h, y_h, turn_h, yaw_acceleration,
             gravity[0], gravity[1], density_ratio,
         )  # fmt: skip
         v_3 = phi_rate + 0.5 * step * k_2
         k_3 = drag + vane_acceleration(
-            p, phi + 0.5 * step * v_2, v_3, alpha, h, turn, yaw_acceleration,
+            p, phi + 0.5 * step * v_2, v_3, x_h, y_h, turn_h, yaw_acceleration,
             gravity[0], gravity[1], density_ratio,
         )  # fmt: skip
         v_4 = phi_rate + step * k_3
         k_4 = drag + vane_acceleration(
-            p, phi + step * v_3, v_4, alpha, h, turn, yaw_acceleration,
+            p, phi + step * v_3, v_4, x_1, y_1, turn_1, yaw_acceleration,
             gravity[0], gravity[1], density_ratio,
         )  # fmt: skip
         phi += step / 6.0 * (phi_rate + 2.0 * v_2 + 2.0 * v_3 + v_4)
