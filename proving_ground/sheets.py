@@ -26,11 +26,16 @@ def station_sheet(station: Station) -> dict[str, Any]:
         else _propeller(station, station.rotor)
     )
     swing = vane_sheet(station.vane)
+    errors = dict(station.sheet_errors)
+    for key in ("calibration_distance", "distance_constant"):
+        rotor[key] = round(rotor[key] * errors.get(key, 1.0), 5)
     vane = {
         "name": "vane",
         "kind": "vane",
         "joint_states": "/vane/joint_states",
-        "distance_constant": round(swing.distance_constant, 4),
+        "distance_constant": round(
+            swing.distance_constant * errors.get("vane_distance_constant", 1.0), 4
+        ),
         "damping_ratio": round(swing.damping_ratio, 4),
     }
     sheet: dict[str, Any] = {

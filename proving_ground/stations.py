@@ -85,7 +85,8 @@ class Sonic:
 class Station:
     """One station as it is, healthy. kind: A mast with cup and vane, B boat with cup and vane,
     C mast with a propeller on the vane. lean [rad] and lean_bearing [rad] of the mast; decay is
-    the coherence exponent of its site; slots are the true places of the pulses in a turn [1]."""
+    the coherence exponent of its site; sheet_errors are factors [1] on constants of its certificate
+    by name; slots are the true places of the pulses in a turn [1]."""
 
     kind: str
     seed: int
@@ -100,6 +101,7 @@ class Station:
     vane_rate: float
     decay: float
     boat: Boat | None = None
+    sheet_errors: tuple[tuple[str, float], ...] = ()
 
     @property
     def rotor_name(self) -> str:

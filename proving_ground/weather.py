@@ -20,7 +20,8 @@ class Weather:
     wander_speed [1] is the standard deviation of the logarithm of the slow speed, wander_direction
     [rad] that of the slow heading, veer [rad] its steady turn over the record; heading [rad] is
     where the air goes, counter-clockwise from east; gust_fronts counts sudden changes;
-    temperature [deg C] with its swing [K]; pressure [Pa].
+    temperature [deg C] with its swing [K]; pressure [Pa]; cross_ratio and vertical_ratio [1] of the
+    other standard deviations; slowest [m/s] the slow wind gets.
     """
 
     mean_speed: float
@@ -35,6 +36,7 @@ class Weather:
     pressure: float = 101300.0
     cross_ratio: float = 0.8
     vertical_ratio: float = 0.5
+    slowest: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def slow_wind(rng: np.random.Generator, time: Array, weather: Weather) -> SlowWi
         speed = speed * (1.0 + rng.uniform(0.25, 0.7) * rise * relax)
         heading = heading + rng.normal(0.0, 0.5) * rise * relax
     burst = np.exp(0.2 * wandering(rng, time, 20.0, 300.0))
-    return SlowWind(np.clip(speed, 0.6, 18.0), heading, weather.turbulence * burst)
+    return SlowWind(np.clip(speed, weather.slowest, 18.0), heading, weather.turbulence * burst)
 
 
 def air_density(temperature: Array | float, pressure: Array | float) -> Array:

@@ -1,0 +1,152 @@
+"""The outcome of one diagnosis against one answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from proving_ground.scoring.intervals import Coverage, covered
+
+OUTCOMES = (
+    "exact",
+    "ambiguous with the truth",
+    "partly",
+    "wrong name",
+    "wrong set",
+    "unknown",
+    "none",
+    "inconclusive",
+    "failed",
+)
+NAMES_SOMETHING = ("exact", "ambiguous with the truth", "partly", "wrong name", "wrong set")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One recording of a sealed set, opened.
+
+    truth: names of the concealed causes ("unknown" for one that is in no catalogue); size: of the
+    smallest of them in multiples of its minimum; named: certain findings; sets: groups of
+    alternatives; reported: the column of the confusion matrix; excess_removed [1] on held-out
+    data, or None.
+    """
+
+    name: str
+    stratum: str
+    kind: str
+    truth: tuple[str, ...]
+    stranger: str
+    size: float
+    verdict: str
+    named: tuple[str, ...]
+    sets: tuple[tuple[str, ...], ...]
+    outcome: str
+    seconds: float
+    memory: float
+    excess_removed: float | None
+    coverage: tuple[Coverage, ...]
+
+    @property
+    def found(self) -> bool:
+        """Whether the truth was named, or is in the set of alternatives."""
+        return self.outcome in ("exact", "ambiguous with the truth")
+
+    @property
+    def reported(self) -> str:
+        """What the diagnosis said, as a column of the confusion matrix."""
+        if self.verdict in ("none", "unknown", "inconclusive", "failed"):
+            return self.verdict
+        if self.verdict == "ambiguous" or self.sets:
+            return "ambiguous"
+        if len(self.named) > 1:
+            return "several"
+        return self.named[0] if self.named else "none"
+
+    @property
+    def set_size(self) -> float:
+        """Mean number of names offered for each finding."""
+        groups = [1] * len(self.named) + [len(group) for group in self.sets]
+        return sum(groups) / len(groups) if groups else 0.0
+
+
+def judge(
+    name: str,
+    answer: dict[str, Any],
+    diagnosis: dict[str, Any] | None,
+    run: dict[str, Any] | None,
+) -> Judged:
+    """Compare a diagnosis with its answer; a missing one counts as failed."""
+    causes = answer["causes"]
+    truth = tuple(str(c["effect"]) for c in causes)
+    strangers = [str(c["stranger"]) for c in causes if "stranger" in c]
+    sizes = [float(c["size_factor"]) for c in causes]
+    named, sets = findings_of(diagnosis) if diagnosis else ((), ())
+    verdict = str(diagnosis["verdict"]) if diagnosis else "failed"
+    outcome = outcome_of(truth, verdict, named, sets)
+    return Judged(
+        name=name,
+        stratum=str(answer["stratum"]),
+        kind=str(answer["kind"]),
+        truth=truth,
+        stranger=strangers[0] if strangers else "",
+        size=min(sizes, default=0.0),
+        verdict=verdict,
+        named=named,
+        sets=sets,
+        outcome=outcome,
+        seconds=float(run["seconds"]) if run else 0.0,
+        memory=float(run["memory"]) if run else 0.0,
+        excess_removed=_excess_removed(diagnosis) if diagnosis and outcome == "exact" else None,
+        coverage=covered(causes, diagnosis) if diagnosis and outcome == "exact" else (),
+    )
+
+
+def findings_of(
+    diagnosis: dict[str, Any],
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Certain names, and groups of alternatives, of a diagnosis."""
+    named: list[str] = []
+    groups: dict[object, list[str]] = {}
+    for finding in diagnosis.get("findings", []):
+        effect = str(finding["effect"])
+        group = finding.get("set")
+        if effect == "unknown":
+            continue
+        if group is None:
+            named.append(effect)
+        else:
+            groups.setdefault(group, []).append(effect)
+    single = [members[0] for members in groups.values() if len(set(members)) == 1]
+    several = tuple(tuple(dict.fromkeys(m)) for m in groups.values() if len(set(m)) > 1)
+    return tuple(dict.fromkeys([*named, *single])), several
+
+
+def outcome_of(
+    truth: tuple[str, ...],
+    verdict: str,
+    named: tuple[str, ...],
+    sets: tuple[tuple[str, ...], ...],
+) -> str:
+    """One of OUTCOMES."""
+    if verdict in ("none", "unknown", "inconclusive", "failed"):
+        return verdict
+    real = set(truth) - {"unknown"}
+    if any(effect not in real for effect in named):
+        return "wrong name"
+    if any(not real & set(group) for group in sets):
+        return "wrong set"
+    offered = set(named).union(*sets) if sets else set(named)
+    if not offered:
+        return "none"
+    if not real <= offered or "unknown" in truth:
+        return "partly"
+    return "ambiguous with the truth" if sets else "exact"
+
+
+def _excess_removed(diagnosis: dict[str, Any]) -> float | None:
+    shares = [
+        float(f["proof"]["excess_removed"])
+        for f in diagnosis.get("findings", [])
+        if isinstance(f.get("proof"), dict) and f["proof"].get("excess_removed") is not None
+    ]
+    return min(shares) if shares else None

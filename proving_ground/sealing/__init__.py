@@ -1,0 +1,1 @@
+"""Sealing, running and opening: three steps that two people can play."""

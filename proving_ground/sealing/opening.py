@@ -1,0 +1,72 @@
+"""Check the commitment and bring answers and diagnoses together."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from proving_ground.scoring.card import write_card
+from proving_ground.scoring.outcome import Judged, judge
+from proving_ground.scoring.rates import Rate
+from proving_ground.sealing.cipher import commitment, decrypt
+from proving_ground.sealing.seal import ANSWERS
+from proving_ground.sealing.trial import DIAGNOSIS, RUN_FILE, RUNS, read_manifest
+from wind_sensors.errors import UserError
+
+
+def open_answers(folder: Path, key: bytes) -> dict[str, Any]:
+    """The answers of a sealed set, after checking them against the commitment.
+
+    Raises UserError if the key is wrong or the answers are not those committed to.
+    """
+    promised = str(read_manifest(folder)["commitment"])
+    plain = decrypt(key, (folder / ANSWERS).read_bytes())
+    if commitment(plain) != promised:
+        raise UserError(
+            "the answers are not those that were committed to",
+            str(folder / ANSWERS),
+            "Somebody changed the manifest or the answers after sealing.",
+        )
+    answers: dict[str, Any] = json.loads(plain)["answers"]
+    return answers
+
+
+def judge_all(folder: Path, answers: dict[str, Any]) -> list[Judged]:
+    """Every recording's outcome, in the order of the answers."""
+    return [
+        judge(
+            name,
+            answer,
+            _load(folder / RUNS / name / DIAGNOSIS),
+            _load(folder / RUNS / name / RUN_FILE),
+        )
+        for name, answer in answers.items()
+    ]
+
+
+def _load(path: Path) -> dict[str, Any] | None:
+    if not path.is_file():
+        return None
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
+
+
+def score(folder: Path, key: bytes, output: Path, *, force: bool = False) -> list[Rate]:
+    """Open a sealed set and write its score card.
+
+    Raises UserError if the output exists and `force` is not given.
+    """
+    if output.exists() and not force:
+        raise UserError("there is a score already", str(output), "Add --force to replace it.")
+    answers = open_answers(folder, key)
+    judged = judge_all(folder, answers)
+    manifest = read_manifest(folder)
+    about = {
+        "commitment, checked": manifest["commitment"],
+        "diagnosed": sum(j.outcome != "failed" for j in judged),
+        "peak memory [MB]": round(max((j.memory for j in judged), default=0.0)),
+    }
+    rates = write_card(output, judged, about)
+    (output / "answers.json").write_text(json.dumps(answers, indent=1), encoding="utf-8")
+    return rates

@@ -1,0 +1,101 @@
+"""Write a sealed set: recordings under random names, hidden answers, a public commitment."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import track
+
+from proving_ground.generate import RecordingSpec, generate_recording
+from proving_ground.sealing.cipher import commitment, derive, encrypt
+from proving_ground.sealing.strata import Plan, make_plan
+from wind_sensors.errors import UserError
+
+MANIFEST = "manifest.json"
+ANSWERS = "answers.sealed"
+RECORDINGS = "recordings"
+HEALTHY = "healthy"
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """What sealing leaves: the folder, the commitment and how many recordings it holds."""
+
+    folder: Path
+    commitment: str
+    recordings: int
+
+
+def seal(
+    folder: Path,
+    total: int,
+    seed: int,
+    key: bytes,
+    *,
+    minutes: float = 15.0,
+    healthy_count: int = 6,
+    kinds: str = "ABC",
+    strata: dict[str, int] | None = None,
+    jobs: int = 1,
+) -> Sealed:
+    """Draw, write and seal a set.
+
+    The weather and what is concealed follow from `seed` and the secret `key` together, so that
+    the seed alone gives nothing away and the key alone lets anyone make the set again.
+
+    Raises UserError if the folder exists already.
+    """
+    if folder.exists():
+        raise UserError("the folder exists already", str(folder), "Give another one with -o.")
+    rng = np.random.default_rng(int.from_bytes(derive(key, f"plan {seed}"), "big"))
+    plan = make_plan(total, rng, minutes, healthy_count, kinds, strata)
+    names = _names(len(plan.cases), key, seed)
+    answers = _write(folder, plan, names, jobs)
+    plain = json.dumps({"salt": secrets.token_hex(32), "seed": seed, "answers": answers}).encode()
+    committed = commitment(plain)
+    groups = {
+        name: f"station-{case.station + 1}" for name, case in zip(names, plan.cases, strict=True)
+    }
+    manifest = {
+        "commitment": committed,
+        "recordings": {name: {"healthy": groups[name]} for name in sorted(names)},
+    }
+    (folder / MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
+    (folder / ANSWERS).write_bytes(encrypt(key, plain))
+    return Sealed(folder, committed, len(names))
+
+
+def _names(count: int, key: bytes, seed: int) -> list[str]:
+    return [derive(key, f"name {seed} {i}").hex()[:10] for i in range(count)]
+
+
+def _write(folder: Path, plan: Plan, names: list[str], jobs: int) -> dict[str, Any]:
+    specs: list[RecordingSpec] = []
+    for i, well in enumerate(plan.healthy):
+        place = folder / HEALTHY / f"station-{i + 1}"
+        specs += [spec.into(place / f"healthy-{j + 1}") for j, spec in enumerate(well)]
+    first = len(specs)
+    specs += [
+        case.spec.into(folder / RECORDINGS / name)
+        for name, case in zip(names, plan.cases, strict=True)
+    ]
+    if jobs > 1:
+        with ProcessPoolExecutor(jobs) as pool:
+            made = list(track(pool.map(generate_recording, specs), "writing", total=len(specs)))
+    else:
+        made = [generate_recording(spec) for spec in track(specs, "writing")]
+    return {
+        name: {
+            "stratum": case.stratum,
+            "station": case.station + 1,
+            "kind": case.spec.station.kind,
+            "causes": answer,
+        }
+        for name, case, answer in zip(names, plan.cases, made[first:], strict=True)
+    }

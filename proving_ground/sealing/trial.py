@@ -1,0 +1,135 @@
+"""Diagnose every recording of a sealed set in a process that sees nothing but the recording."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.progress import track
+
+from proving_ground.sealing.seal import HEALTHY, MANIFEST, RECORDINGS
+from wind_sensors.errors import UserError
+
+RUNS = "runs"
+RUN_FILE = "run.json"
+LOG_FILE = "diagnose.log"
+DIAGNOSIS = "diagnosis.json"
+PROGRAM = (sys.executable, "-m", "wind_sensors.cli", "diagnose")
+PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "VIRTUAL_ENV", "PYTHONPATH")
+
+
+@dataclass(frozen=True)
+class Run:
+    """How one diagnosis went: exit status (-1: out of time), seconds and peak memory [MB]."""
+
+    status: int
+    seconds: float
+    memory: float
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The public part of a sealed set. Raises UserError if there is none."""
+    path = folder / MANIFEST
+    if not path.is_file():
+        raise UserError("this is not a sealed set", str(folder), "`wind prove seal` makes one.")
+    manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return manifest
+
+
+def run_all(
+    folder: Path,
+    *,
+    jobs: int = 1,
+    timeout: float = 300.0,
+    options: Sequence[str] = (),
+    program: Sequence[str] = PROGRAM,
+) -> int:
+    """Diagnose what has not been diagnosed yet; how many diagnoses failed.
+
+    options are added to the command line of the program, which is `wind diagnose`.
+    """
+    manifest = read_manifest(folder)
+    todo = [
+        (name, str(entry["healthy"]))
+        for name, entry in manifest["recordings"].items()
+        if not (folder / RUNS / name / RUN_FILE).exists()
+    ]
+
+    def one(item: tuple[str, str]) -> Run:
+        return run_one(folder, item[0], item[1], timeout, [*program], options)
+
+    with ThreadPoolExecutor(max(1, jobs)) as pool:
+        runs = list(track(pool.map(one, todo), "diagnosing", total=len(todo)))
+    return sum(run.status != 0 for run in runs)
+
+
+def run_one(
+    folder: Path,
+    name: str,
+    station: str,
+    timeout: float,
+    program: Sequence[str] = PROGRAM,
+    options: Sequence[str] = (),
+) -> Run:
+    """Diagnose one recording in a folder of its own, with an environment of its own."""
+    target = folder / RUNS / name
+    target.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="wind-prove-") as place:
+        room = Path(place)
+        _bring(folder / RECORDINGS / name, room / "recording")
+        _bring(folder / HEALTHY / station, room / "healthy")
+        healthy = sorted(str(p.relative_to(room)) for p in (room / "healthy").iterdir())
+        command = [*program, "recording", "--healthy", *healthy, "-o", "out", *options]
+        run = _supervise(command, room, target / LOG_FILE, timeout)
+        for path in (room / "out").glob("*"):
+            if path.name in (DIAGNOSIS, "report.html", "station_corrected.yaml"):
+                shutil.copy(path, target / path.name)
+    (target / RUN_FILE).write_text(json.dumps(asdict(run)), encoding="utf-8")
+    return run
+
+
+def _bring(source: Path, target: Path) -> None:
+    """Copy a folder, by hard links where the file system allows."""
+
+    def link(one: str, other: str) -> None:
+        try:
+            os.link(one, other)
+        except OSError:
+            shutil.copy2(one, other)
+
+    shutil.copytree(source, target, copy_function=link)
+
+
+def _supervise(command: Sequence[str], room: Path, log: Path, timeout: float) -> Run:
+    environment = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
+    root = str(Path(__file__).resolve().parents[2])
+    known = environment.get("PYTHONPATH", "")
+    environment["PYTHONPATH"] = f"{root}{os.pathsep}{known}" if known else root
+    environment["OMP_NUM_THREADS"] = environment["OPENBLAS_NUM_THREADS"] = "1"
+    begun = time.monotonic()
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            command, cwd=room, env=environment, stdout=output, stderr=subprocess.STDOUT
+        )
+        while True:
+            pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+            if pid:
+                process.returncode = os.waitstatus_to_exitcode(status)
+                break
+            if time.monotonic() - begun > timeout:
+                process.kill()
+                _, _, usage = os.wait4(process.pid, 0)
+                process.returncode = -1
+                break
+            time.sleep(0.02)
+    return Run(process.returncode, time.monotonic() - begun, usage.ru_maxrss / 1024.0)

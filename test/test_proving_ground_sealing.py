@@ -1,0 +1,211 @@
+"""Sealing hides, commits, isolates and opens; scoring counts what it should."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proving_ground.generate import RecordingSpec
+from proving_ground.scoring.dose import dose_response
+from proving_ground.scoring.figures import confusion
+from proving_ground.scoring.intervals import covered
+from proving_ground.scoring.outcome import Judged, judge
+from proving_ground.scoring.rates import clopper_pearson, promised_rates
+from proving_ground.sealing.cipher import commitment, decrypt, encrypt, new_key
+from proving_ground.sealing.opening import judge_all, open_answers, score
+from proving_ground.sealing.seal import ANSWERS, MANIFEST, RECORDINGS, Sealed, seal
+from proving_ground.sealing.strata import SHARES, SIZES, counts, make_plan
+from proving_ground.sealing.trial import run_all
+from wind_sensors.errors import UserError
+
+KEY = bytes(range(32))
+SPY = """
+import json, os, pathlib, sys
+target = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
+target.mkdir()
+seen = sorted(str(p) for p in pathlib.Path(".").rglob("*"))
+print(json.dumps({"cwd": os.getcwd(), "seen": seen, "environment": dict(os.environ)}))
+verdict = {"verdict": "named", "findings": [{"effect": "vane_offset", "parameters": {}}]}
+(target / "diagnosis.json").write_text(json.dumps(verdict))
+"""
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory: pytest.TempPathFactory) -> Sealed:
+    folder = tmp_path_factory.mktemp("sealed") / "set"
+    return seal(
+        folder,
+        2,
+        3,
+        KEY,
+        minutes=0.4,
+        healthy_count=1,
+        kinds="A",
+        strata={"healthy": 1, "single": 1},
+    )
+
+
+def judged(
+    truth: tuple[str, ...] = (),
+    verdict: str = "none",
+    findings: Sequence[Mapping[str, object]] = (),
+    size: float = 3.0,
+    stratum: str = "single",
+) -> Judged:
+    causes = [{"effect": effect, "size_factor": size} for effect in truth]
+    answer = {"stratum": stratum, "kind": "A", "causes": causes}
+    diagnosis = {"verdict": verdict, "findings": list(findings)}
+    return judge("x", answer, diagnosis, {"seconds": 3.0, "memory": 100.0})
+
+
+def test_a_sealed_text_opens_with_its_key_and_with_no_other() -> None:
+    plain = b"bearing_friction" * 100
+    hidden = encrypt(KEY, plain)
+    assert decrypt(KEY, hidden) == plain
+    assert plain[:16] not in hidden
+    with pytest.raises(UserError, match="does not open"):
+        decrypt(new_key(), hidden)
+
+
+def test_a_changed_text_does_not_open() -> None:
+    hidden = bytearray(encrypt(KEY, b"none"))
+    hidden[18] ^= 1
+    with pytest.raises(UserError):
+        decrypt(KEY, bytes(hidden))
+
+
+def test_a_sealed_set_tells_nothing_but_its_commitment(sealed: Sealed) -> None:
+    answers = open_answers(sealed.folder, KEY)
+    causes = [c["effect"] for a in answers.values() for c in a["causes"]]
+    assert len(causes) == 1
+    for path in sealed.folder.rglob("*"):
+        assert causes[0] not in path.name
+        if path.suffix in (".json", ".yaml", ".sealed"):
+            assert causes[0].encode() not in path.read_bytes()
+    assert json.loads((sealed.folder / MANIFEST).read_text())["commitment"] == sealed.commitment
+
+
+def test_answers_swapped_after_sealing_are_refused(sealed: Sealed, tmp_path: Path) -> None:
+    other = {"salt": "0", "answers": {}}
+    (tmp_path / MANIFEST).write_text((sealed.folder / MANIFEST).read_text())
+    (tmp_path / ANSWERS).write_bytes(encrypt(KEY, json.dumps(other).encode()))
+    with pytest.raises(UserError, match="committed"):
+        open_answers(tmp_path, KEY)
+    assert commitment(b"a") != commitment(b"b")
+
+
+def test_the_diagnosing_process_sees_the_recording_and_nothing_else(
+    sealed: Sealed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spy = tmp_path / "spy.py"
+    spy.write_text(SPY)
+    monkeypatch.setenv("PROVE_SECRET", KEY.hex())
+    assert run_all(sealed.folder, program=(sys.executable, str(spy))) == 0
+    names = [p.name for p in (sealed.folder / RECORDINGS).iterdir()]
+    for name in names:
+        log = (sealed.folder / "runs" / name / "diagnose.log").read_text()
+        spied = json.loads(log)
+        assert KEY.hex() not in log
+        assert str(sealed.folder) not in log
+        assert not [p for p in spied["seen"] if "answers" in p or "manifest" in p or name in p]
+        assert "recording/recording.yaml" in spied["seen"]
+    results = judge_all(sealed.folder, open_answers(sealed.folder, KEY))
+    healthy = next(j for j in results if j.stratum == "healthy")
+    assert healthy.outcome == "wrong name"
+
+
+def test_opening_writes_a_card_that_lists_the_failures(sealed: Sealed, tmp_path: Path) -> None:
+    rates = score(sealed.folder, KEY, tmp_path / "score")
+    page = (tmp_path / "score" / "score.md").read_text()
+    missing = [j for j in judge_all(sealed.folder, open_answers(sealed.folder, KEY))]
+    assert all(j.name in page for j in missing if j.stratum == "healthy")
+    assert next(r for r in rates if "healthy" in r.title).total == 1
+    with pytest.raises(UserError, match="already"):
+        score(sealed.folder, KEY, tmp_path / "score")
+
+
+@pytest.mark.parametrize("total", [1, 7, 60, 333])
+def test_strata_add_up(total: int) -> None:
+    assert sum(counts(total).values()) == total
+    assert set(counts(total)) == set(SHARES)
+
+
+def test_single_effects_come_at_every_size_and_every_effect_before_any_again() -> None:
+    plan = make_plan(0, np.random.default_rng(1), 1.0, 1, "AB", {"single": 60})
+    planted = [c.spec.planted[0] for c in plan.cases]
+    assert {p.size_factor for p in planted} <= set(SIZES)
+    count = {p.effect: 0 for p in planted}
+    for each in planted:
+        count[each.effect] += 1
+    assert max(count.values()) - min(count.values()) <= 1
+    seeds = [s.seed for s in all_specs(plan.healthy)] + [c.spec.seed for c in plan.cases]
+    assert len(set(seeds)) == len(seeds)
+
+
+def all_specs(groups: tuple[tuple[RecordingSpec, ...], ...]) -> list[RecordingSpec]:
+    return [spec for group in groups for spec in group]
+
+
+def test_clopper_pearson_matches_published_values() -> None:
+    assert clopper_pearson(0, 10) == pytest.approx((0.0, 0.3085), abs=1e-4)
+    assert clopper_pearson(8, 10) == pytest.approx((0.4439, 0.9748), abs=1e-4)
+
+
+def test_outcomes() -> None:
+    one = ({"effect": "vane_offset"},)
+    assert judged(("vane_offset",), "named", one).outcome == "exact"
+    assert judged(("vane_inertia",), "named", one).outcome == "wrong name"
+    pair = ({"effect": "vane_offset", "set": 1}, {"effect": "axis_tilt", "set": 1})
+    assert judged(("axis_tilt",), "ambiguous", pair).outcome == "ambiguous with the truth"
+    assert judged(("axis_tilt",), "ambiguous", pair).set_size == 2.0
+    assert judged(("icing",), "ambiguous", pair).outcome == "wrong set"
+    assert judged(("vane_offset", "icing"), "named", one).outcome == "partly"
+    assert judged(("unknown",), "named", one, stratum="unknown").outcome == "wrong name"
+    assert judged((), "none", stratum="healthy").outcome == "none"
+
+
+def test_rates_count_the_cases_they_speak_of() -> None:
+    cases = [
+        judged((), "none", stratum="healthy"),
+        judged((), "named", ({"effect": "icing"},), stratum="healthy"),
+        judged(("vane_offset",), "named", ({"effect": "vane_offset"},)),
+        judged(("vane_offset",), "none", size=1.0),
+        judged(("unknown",), "unknown", stratum="unknown"),
+    ]
+    rates = {r.title: r for r in promised_rates(cases)}
+    assert (rates["a name in a healthy recording"].hits, 2) == (1, 2)
+    exact = rates["the exact effect, single, three times the minimum or more"]
+    assert (exact.hits, exact.total) == (1, 1)
+    wrong = rates["a confident wrong name, all recordings"]
+    assert (wrong.hits, wrong.total) == (1, 5)
+    rows, columns, table = confusion(cases)
+    assert table.sum() == len(cases)
+    assert table[rows.index("none"), columns.index("icing")] == 1
+
+
+def test_coverage_compares_what_means_the_same() -> None:
+    cause = {"effect": "vane_offset", "offset_deg": -3.0}
+    given = {"offset": {"value": -3.1, "low": -3.4, "high": -2.9}}
+    diagnosis = {"findings": [{"effect": "vane_offset", "parameters": given}]}
+    (found,) = covered([cause], diagnosis)
+    assert found.holds
+    assert not covered([{"effect": "wake_shadow", "depth": 0.1}], diagnosis)
+
+
+def test_the_dose_curve_finds_the_size_found_in_half() -> None:
+    rng = np.random.default_rng(2)
+    cases = []
+    for size in np.tile(SIZES, 60):
+        found = rng.random() < 1.0 / (1.0 + (2.0 / size) ** 4)
+        findings = ({"effect": "vane_offset"},) if found else ()
+        verdict = "named" if found else "none"
+        cases.append(judged(("vane_offset",), verdict, findings, size=float(size)))
+    dose = dose_response("all", cases)
+    assert dose is not None
+    assert dose.half == pytest.approx(2.0, rel=0.15)
+    assert dose.ninety == pytest.approx(2.0 * 9.0**0.25, rel=0.25)

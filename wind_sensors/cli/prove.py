@@ -1,0 +1,164 @@
+"""`wind prove`: seal recordings, diagnose them blind, open and score."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wind_sensors.errors import UserError
+
+if TYPE_CHECKING:
+    from proving_ground.scoring.rates import Rate
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add `prove` and its steps to the command line."""
+    parser = subparsers.add_parser(
+        "prove",
+        help="the proving ground: an independent world to test against",
+        description="Recordings of an independent world with concealed causes: one person seals "
+        "them, another diagnoses them, and opening them gives the score card.",
+    )
+    steps = parser.add_subparsers(dest="step", required=True)
+
+    seal = steps.add_parser("seal", help="write recordings, hide the answers, print a commitment")
+    seal.add_argument("-n", "--number", type=_positive, default=60, help="recordings to seal")
+    seal.add_argument("--seed", type=int, default=1)
+    seal.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    seal.add_argument("--key", type=Path, metavar="FILE", help="write or read the secret here")
+    seal.add_argument("--minutes", type=float, default=15.0, help="length of a recording")
+    seal.add_argument("--healthy", type=_positive, default=6, help="healthy ones for each station")
+    seal.add_argument("--kinds", default="ABC", help="station kinds: A mast, B boat, C propeller")
+    seal.add_argument("--jobs", type=_positive, default=1)
+
+    trial = steps.add_parser("run", help="diagnose each recording where the answers cannot be read")
+    trial.add_argument("folder", type=Path, metavar="DIR")
+    trial.add_argument("--jobs", type=_positive, default=1)
+    trial.add_argument("--timeout", type=float, default=300.0, help="seconds for one diagnosis")
+    trial.add_argument(
+        "--option", action="append", default=[], help="passed on to `wind diagnose`; repeatable"
+    )
+
+    opened = steps.add_parser("open", help="check the commitment, open the answers and score")
+    opened.add_argument("folder", type=Path, metavar="DIR")
+    opened.add_argument("--key", required=True, metavar="FILE|HEX")
+    opened.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
+    opened.add_argument("--force", action="store_true", help="write over an earlier score")
+
+    demo = steps.add_parser("demo", help="one case from sealing to opening in two minutes")
+    demo.add_argument("-o", "--output", type=Path, default=Path("prove_demo"), metavar="DIR")
+    demo.add_argument("--seed", type=int, default=7)
+    demo.add_argument("--force", action="store_true", help="replace an earlier demo")
+
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run one step; 0 on success, 1 where `open` finds a promise broken."""
+    steps = {"seal": _seal, "run": _run, "open": _open, "demo": _demo}
+    return steps[arguments.step](arguments)
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("at least 1")
+    return value
+
+
+def _seal(arguments: argparse.Namespace) -> int:
+    from proving_ground.sealing.cipher import new_key
+    from proving_ground.sealing.seal import seal
+
+    if set(arguments.kinds) - set("ABC") or not arguments.kinds:
+        raise UserError(f"unknown station kinds {arguments.kinds!r}", "--kinds", "Use A, B, C.")
+    file: Path | None = arguments.key
+    key = _read_key(str(file)) if file is not None and file.exists() else new_key()
+    sealed = seal(
+        arguments.output,
+        arguments.number,
+        arguments.seed,
+        key,
+        minutes=arguments.minutes,
+        healthy_count=arguments.healthy,
+        kinds=arguments.kinds,
+        jobs=arguments.jobs,
+    )
+    print(f"sealed {sealed.recordings} recordings in {sealed.folder}")
+    print(f"commitment {sealed.commitment}")
+    if file is None:
+        print(f"key {key.hex()}  (keep it apart from the recordings)")
+    else:
+        _write_key(file, key)
+        print(f"the key is in {file}; keep it apart from the recordings")
+    return 0
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from proving_ground.sealing.trial import run_all
+
+    failed = run_all(
+        arguments.folder,
+        jobs=arguments.jobs,
+        timeout=arguments.timeout,
+        options=arguments.option,
+    )
+    print(f"diagnoses are in {arguments.folder / 'runs'}; {failed} failed")
+    return 0
+
+
+def _open(arguments: argparse.Namespace) -> int:
+    from proving_ground.sealing.opening import score
+
+    output = arguments.output or arguments.folder / "score"
+    rates = score(arguments.folder, _read_key(arguments.key), output, force=arguments.force)
+    _print_rates(rates)
+    print(f"wrote {output}")
+    return int(any(rate.met is False for rate in rates))
+
+
+def _demo(arguments: argparse.Namespace) -> int:
+    from proving_ground.sealing.demo import play
+
+    play(arguments.output, arguments.seed, force=arguments.force)
+    return 0
+
+
+def _print_rates(rates: list[Rate]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("what", "rate", "95 % interval", "promised")
+    for rate in rates:
+        if rate.total:
+            low, high = rate.interval
+            table.add_row(
+                rate.title,
+                f"{100 * rate.value:.1f} % ({rate.hits}/{rate.total})",
+                f"{100 * low:.1f} to {100 * high:.1f} %",
+                rate.promised,
+                style="" if rate.met is not False else "bold",
+            )
+    Console().print(table)
+
+
+def _read_key(given: str) -> bytes:
+    path = Path(given)
+    text = path.read_text(encoding="ascii").strip() if path.is_file() else given
+    try:
+        key = bytes.fromhex(text)
+    except ValueError:
+        key = b""
+    if len(key) != 32:
+        raise UserError(
+            "this is not a key", given if path.is_file() else "--key", "A key is 64 hex digits."
+        )
+    return key
+
+
+def _write_key(path: Path, key: bytes) -> None:
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(handle, "w", encoding="ascii") as file:
+        file.write(key.hex() + "\n")
