@@ -8,8 +8,9 @@ from wind_sensors.estimation.outputs import (
     WindEstimate,
     WindowStatistics,
 )
+from wind_sensors.estimation.processing import process
 from wind_sensors.estimation.settings import METHODS, EstimatorSettings, Method
-from wind_sensors.estimation.streaming import StreamingEstimator
+from wind_sensors.estimation.streaming import StreamingEstimator, make_estimator
 
 __all__ = [
     "METHODS",
@@ -22,4 +23,6 @@ __all__ = [
     "StreamingEstimator",
     "WindEstimate",
     "WindowStatistics",
+    "make_estimator",
+    "process",
 ]

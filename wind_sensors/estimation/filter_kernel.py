@@ -34,6 +34,7 @@ from wind_sensors.estimation.turbulence_process import (
     VERTICAL_VARIANCES,
     WANDERING,
     WIND_STATES,
+    slow_vertical_variance,
 )
 
 FloatArray = npt.NDArray[np.float64]
@@ -119,7 +120,10 @@ def prepare_wind_noise(
     for i in range(_VERTICAL):
         d = math.exp(-dt / VERTICAL_CONSTANTS[i])
         ring.decay[slot, 2 * PAIRS + i] = d
-        noise[PAIRS + i, 0] = f.levels[2] * VERTICAL_VARIANCES[i] * (1.0 - d * d)
+        variance = VERTICAL_VARIANCES[i]
+        if i == _VERTICAL - 1:
+            variance = slow_vertical_variance(f.height[0], size)
+        noise[PAIRS + i, 0] = f.levels[2] * variance * (1.0 - d * d)
 
 
 @compiled
@@ -202,11 +206,13 @@ def overspeeding(
         + slope_wind * curvature
     )
     density = c[AIR_DENSITY] / s.mounting[rotor, 6]
-    return density * second / (s.rotor[rotor, 3] * s.rotor[rotor, 12])
+    return float(density * second / (s.rotor[rotor, 3] * s.rotor[rotor, 12]))
 
 
 @compiled
-def predict(f: FilterState, s: Instruments, ring: Ring, slot: int, c: FloatArray, dt: float) -> None:
+def predict(
+    f: FilterState, s: Instruments, ring: Ring, slot: int, c: FloatArray, dt: float
+) -> None:
     """Let dt [s] pass; the step's transition goes into the ring."""
     n = f.mean.shape[0]
     w = WIND_STATES
@@ -360,7 +366,7 @@ def correct(
     ring.measured[slot] = measured
     ring.innovation[slot] = innovation
     ring.variance[slot] = total
-    return squared
+    return float(squared)
 
 
 @compiled
@@ -373,7 +379,7 @@ def correct_by_reading(f: FilterState, s: Instruments, ring: Ring, slot: int, v:
     innovation -= 2.0 * math.pi * math.floor((innovation + math.pi) / (2.0 * math.pi))
     squared = correct(f, ring, slot, measured, innovation, f.reading_variance[v] + extra_variance)
     ring.kind[slot] = READING if extra_variance == 0.0 else -READING
-    ring.index[slot] = v
+    ring.which[slot] = v
     _note(f, rotors + v, squared)
 
 
@@ -397,7 +403,7 @@ def correct_by_edge(f: FilterState, s: Instruments, ring: Ring, slot: int, r: in
     expected = (number + f.slot_error[r, place]) * width
     off = (expected - f.mean[measured]) / width
     spread = math.sqrt(f.covariance[measured, measured]) / width
-    lost = -int(math.floor(off + 0.5))
+    lost = -math.floor(off + 0.5)
     if lost != 0:
         number += lost
         f.edge_count[r] = number
@@ -412,8 +418,32 @@ def correct_by_edge(f: FilterState, s: Instruments, ring: Ring, slot: int, r: in
     variance = (f.edge_variance[r] + min(spread, 1.0) ** 4) * width * width
     squared = correct(f, ring, slot, measured, innovation, variance)
     ring.kind[slot] = EDGE
-    ring.index[slot] = r
+    ring.which[slot] = r
     ring.slot[slot] = place
+    _note(f, r, squared)
+
+
+@compiled
+def correct_by_turns(f: FilterState, ring: Ring, slot: int, r: int, angle: float) -> None:
+    """The angle that rotor r has turned through [rad], from a counter or an encoder.
+
+    A reading far from what the rotor can have done means that the counter began anew.
+    """
+    measured = WIND_STATES + 2 * r + 1
+    width = 2.0 * math.pi / f.slots[r]
+    innovation = angle - f.mean[measured]
+    spread = math.sqrt(f.covariance[measured, measured])
+    if abs(innovation) > 4.0 * spread + 20.0 * width:
+        f.rejected[r] += 1
+        if f.rejected[r] >= 3:
+            f.mean[measured] = angle
+            f.rejected[r] = 0
+            f.tally[r, 3] += 1
+        return
+    f.rejected[r] = 0
+    squared = correct(f, ring, slot, measured, innovation, f.edge_variance[r] * width * width)
+    ring.kind[slot] = EDGE
+    ring.which[slot] = r
     _note(f, r, squared)
 
 

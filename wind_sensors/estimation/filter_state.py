@@ -13,7 +13,7 @@ from wind_sensors.estimation.turbulence_process import LEVELS, PAIRS, WIND_STATE
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-OUTPUT, READING, EDGE = 0, 1, 2
+OUTPUT, READING, EDGE, TURNS = 0, 1, 2, 3
 """Kinds of events. The order decides between events of the same nanosecond."""
 
 LARGEST_SLOTS = 64
@@ -44,6 +44,7 @@ class FilterState(NamedTuple):
         tally: By rotor: accepted, lost, extra, found again; shape (rotors, 4).
         innovation: Running sum of squared normalised innovations and their number (rotors, then
             vanes), shape (rotors + vanes, 2).
+        height: Above the ground [m], shape (1,).
         outliers: Readings and edges far outside their expected scatter (rotors, then vanes).
     """
 
@@ -67,6 +68,7 @@ class FilterState(NamedTuple):
     tally: IntArray
     innovation: FloatArray
     outliers: IntArray
+    height: FloatArray
 
 
 class Ring(NamedTuple):
@@ -75,7 +77,7 @@ class Ring(NamedTuple):
     Attributes:
         time: [ns], shape (c,).
         kind: Kind of event, shape (c,).
-        index: Rotor or vane of the event.
+        which: Rotor or vane of the event.
         slot: Slot of an edge, -1 otherwise.
         measured: Index of the measured state, -1 without a measurement.
         innovation, variance: nu and S of the measurement.
@@ -92,7 +94,7 @@ class Ring(NamedTuple):
 
     time: IntArray
     kind: IntArray
-    index: IntArray
+    which: IntArray
     slot: IntArray
     measured: IntArray
     innovation: FloatArray
@@ -133,6 +135,7 @@ def empty_filter(rotors: int, vanes: int) -> FilterState:
         tally=np.zeros((rotors, 4), dtype=np.int64),
         innovation=np.zeros((rotors + vanes, 2)),
         outliers=np.zeros(rotors + vanes, dtype=np.int64),
+        height=np.array([10.0]),
     )
 
 
@@ -143,7 +146,7 @@ def empty_ring(capacity: int, rotors: int, vanes: int) -> Ring:
     return Ring(
         time=np.zeros(capacity, dtype=np.int64),
         kind=np.zeros(capacity, dtype=np.int64),
-        index=np.zeros(capacity, dtype=np.int64),
+        which=np.zeros(capacity, dtype=np.int64),
         slot=np.zeros(capacity, dtype=np.int64),
         measured=np.zeros(capacity, dtype=np.int64),
         innovation=np.zeros(capacity),
@@ -159,3 +162,22 @@ def empty_ring(capacity: int, rotors: int, vanes: int) -> Ring:
         mean=np.zeros((capacity, n)),
         covariance=np.zeros((capacity, n, n)),
     )
+
+
+def larger_ring(ring: Ring, steps: int, capacity: int) -> Ring:
+    """A ring of at least `capacity` with the last steps of another.
+
+    Args:
+        ring: The old one.
+        steps: Steps made since the start.
+        capacity: Wanted size; rounded up to a power of two.
+    """
+    size = 1 << (capacity - 1).bit_length()
+    old = ring.time.size
+    kept = np.arange(max(0, steps - old), steps)
+    arrays = []
+    for array in ring:
+        new = np.zeros((size, *array.shape[1:]), dtype=array.dtype)
+        new[kept % size] = array[kept % old]
+        arrays.append(new)
+    return Ring(*arrays)

@@ -12,9 +12,10 @@ from wind_sensors.estimation.filter_kernel import (
     correct_by_edge,
     correct_by_reading,
     correct_by_silence,
+    correct_by_turns,
     predict,
 )
-from wind_sensors.estimation.filter_state import EDGE, OUTPUT, READING, FilterState, Ring
+from wind_sensors.estimation.filter_state import EDGE, READING, TURNS, FilterState, Ring
 from wind_sensors.estimation.forward import Instruments
 from wind_sensors.estimation.smoother_kernel import smooth
 from wind_sensors.estimation.turbulence_process import WIND_STATES
@@ -38,7 +39,7 @@ def is_extra_edge(f: FilterState, s: Instruments, r: int, time: int) -> bool:
     y = WIND_STATES + 2 * r
     turned = f.mean[y] * since / (s.rotor[r, 1] * width)
     unsure = math.sqrt(f.covariance[y, y]) * since / (s.rotor[r, 1] * width)
-    return turned + 3.0 * unsure < 0.5
+    return bool(turned + 3.0 * unsure < 0.5)
 
 
 @compiled
@@ -66,9 +67,9 @@ def run(
     Args:
         f, s, ring: Filter, station, steps.
         time: Of the events, in order [ns].
-        kind: OUTPUT, READING or EDGE.
-        index: Vane or rotor.
-        value: Angle of a reading [rad], turns of an edge or nan.
+        kind: OUTPUT, READING, EDGE or TURNS.
+        index: Vane or rotor; running number of an output.
+        value: Angle of a reading or of the rotor [rad]; nan for an edge.
         extra: Additional variance of a reading [rad^2].
         circumstances: Mount and air at the events, shape (n, 19).
         stop: End of the last block [ns].
@@ -106,10 +107,7 @@ def run(
                 continue
             f.tally[which, 0] += 1
             f.rejected[which] = 0
-            if math.isnan(value[i]):
-                f.edge_count[which] += 1
-            else:
-                f.edge_count[which] = int(math.floor(value[i] * f.slots[which] + 0.5))
+            f.edge_count[which] += 1
             f.last_edge[which] = time[i]
             if f.edge_count[which] % f.stride[which] != 0:
                 i += 1
@@ -117,7 +115,7 @@ def run(
         at = f.clock[2] % capacity
         ring.time[at] = time[i]
         ring.kind[at] = this
-        ring.index[at] = which
+        ring.which[at] = which
         ring.slot[at] = -1
         ring.measured[at] = -1
         ring.moved[at] = 0
@@ -129,6 +127,10 @@ def run(
             correct_by_reading(f, s, ring, at, which, value[i], extra[i])
         elif this == EDGE:
             correct_by_edge(f, s, ring, at, which)
+        elif this == TURNS:
+            f.tally[which, 0] += 1
+            f.stride[which] = 0
+            correct_by_turns(f, ring, at, which, value[i])
         else:
             _listen(f, s, ring, at, rotors, which)
             ring.circumstances[at] = circumstances[i]
@@ -145,10 +147,9 @@ def _listen(f: FilterState, s: Instruments, ring: Ring, at: int, rotors: int, wh
     if rotors == 0:
         return
     r = which % rotors
-    if f.tally[r, 0] == 0:
+    if f.tally[r, 0] == 0 or f.stride[r] == 0:
         return
     lost = f.tally[r, 1] / max(f.tally[r, 0], 1)
     allowance = 1.2 if lost < _LOSS_NOTICED else 4.0
     width = 2.0 * math.pi / f.slots[r]
     correct_by_silence(f, ring, at, r, (f.edge_count[r] + allowance) * width)
-    ring.kind[at] = OUTPUT

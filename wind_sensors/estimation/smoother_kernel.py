@@ -232,15 +232,16 @@ def smooth(
             information = 1.0 / ring.variance[at] + quadratic
             if counted:
                 if ring.kind[at] == EDGE:
-                    r = ring.index[at]
+                    r = ring.which[at]
                     width = 2.0 * math.pi / f.slots[r]
                     noise = f.edge_variance[r] * width * width
                     noise_score[r] += noise * error * error
                     noise_expected[r] += noise * information
-                    f.slot_score[r, ring.slot[at]] += error
-                    f.slot_information[r, ring.slot[at]] += weight * information * width
+                    if ring.slot[at] >= 0:
+                        f.slot_score[r, ring.slot[at]] += error
+                        f.slot_information[r, ring.slot[at]] += weight * information * width
                 elif ring.kind[at] == READING:
-                    v = ring.index[at]
+                    v = ring.which[at]
                     noise = f.reading_variance[v]
                     noise_score[rotors + v] += noise * error * error
                     noise_expected[rotors + v] += noise * information

@@ -1,55 +1,280 @@
-"""The estimator that every node and every command uses: messages in, wind out."""
+"""The estimator that every node and every command uses: messages in, wind out.
+
+Fed by stamps alone: the same messages give the same bits, live and offline.
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+import math
 
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.errors import UserError
+from wind_sensors.estimation.constants import rotors_of, vanes_of
+from wind_sensors.estimation.core import Core, Estimates, joined
+from wind_sensors.estimation.health import clock_health, input_health
+from wind_sensors.estimation.intake import (
+    PLATFORM,
+    PRESSURE,
+    PULSES,
+    READINGS,
+    TEMPERATURE,
+    Block,
+    Correction,
+    Intake,
+    clock_correction,
+)
+from wind_sensors.estimation.inverse import InverseCore
+from wind_sensors.estimation.kalman import KalmanCore
+from wind_sensors.estimation.naive import NaiveCore
 from wind_sensors.estimation.outputs import HealthItem, WindEstimate, WindowStatistics
+from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.windows import WindowAccumulator
+from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station
 
 FloatArray = npt.NDArray[np.float64]
 
+_PLATFORM, _TEMPERATURE, _PRESSURE = "platform", "temperature", "pressure"
+_LOOK_AHEAD_NS = 100_000_000
+"""Of the platform's motion, so that it can be interpolated at the end of a block."""
 
-class StreamingEstimator(Protocol):
-    """Fed by stamps alone: the same messages give the same bits, live and offline."""
+
+def _inputs(station: Station) -> dict[str, tuple[int, int, Correction | None]]:
+    inputs: dict[str, tuple[int, int, Correction | None]] = {}
+    for instrument in station.instruments:
+        clock = instrument.clock
+        if isinstance(instrument, (Cup, Propeller)):
+            inputs[instrument.name] = (PULSES, 1, clock_correction(clock.latency, clock.drift))
+        elif isinstance(instrument, Angle):
+            late = clock.latency + instrument.filter_time_constant
+            correction = clock_correction(late, clock.drift)
+            inputs[instrument.name] = (READINGS, 1, correction)
+            if isinstance(instrument, Bivane):
+                inputs[f"{instrument.name}/elevation"] = (READINGS, 1, correction)
+    if station.platform is not None:
+        clock = station.platform.clock
+        inputs[_PLATFORM] = (PLATFORM, 13, clock_correction(clock.latency, clock.drift))
+    inputs[_TEMPERATURE] = (TEMPERATURE, 1, None)
+    inputs[_PRESSURE] = (PRESSURE, 1, None)
+    return inputs
+
+
+def _longest_delay(station: Station) -> float:
+    clocks = [i.clock for i in station.instruments]
+    if station.platform is not None:
+        clocks.append(station.platform.clock)
+    filters = [i.filter_time_constant for i in station.instruments if isinstance(i, Angle)]
+    earliest = min([c.latency for c in clocks], default=0.0)
+    latest = max([c.latency for c in clocks], default=0.0)
+    return max(0.0, latest) + max(filters, default=0.0) - min(0.0, earliest)
+
+
+class StreamingEstimator:
+    """Wind from messages, in constant memory.
+
+    Messages may come in any order within the reordering window. Doubles are dropped, late messages
+    counted; a clock that jumps back makes everything final and starts anew. Made by
+    `make_estimator`.
+
+    Args:
+        station: What is mounted.
+        settings: How to estimate.
+
+    Raises:
+        UserError: The station has no rotor or no vane that the method could use.
+    """
+
+    def __init__(self, station: Station, settings: EstimatorSettings) -> None:
+        if not rotors_of(station) or not vanes_of(station):
+            raise UserError(
+                "An estimate of the wind needs a cup or propeller and a vane.",
+                "instruments",
+                "Add the missing instrument to the station file.",
+            )
+        self.station = station
+        self.settings = settings
+        self._block = max(round(settings.smoother_lag * 0.5e9), 50_000_000)
+        self._inputs = _inputs(station)
+        self._rotors = {r.name for r in rotors_of(station)}
+        self._angles = {n for n, (kind, _, _) in self._inputs.items() if kind == READINGS}
+        self._intake = self._new_intake()
+        self._core: Core | None = None
+        self._windows = WindowAccumulator(station, settings)
+        self._estimates: list[Estimates] = []
+        self._finished: list[WindowStatistics] = []
+        self._unknown: dict[str, int] = {}
+        self._last_health: list[HealthItem] = []
+
+    def _new_intake(self) -> Intake:
+        s = self.settings
+        wait = s.reordering_window + _longest_delay(self.station)
+        return Intake(
+            self._inputs,
+            self._block,
+            round(wait * 1e9),
+            _LOOK_AHEAD_NS if self.station.platform is not None else 0,
+            round(s.gap_time * 1e9),
+            round(s.jump_time * 1e9),
+        )
 
     def add_pulse(self, name: str, time_ns: int, turns: float | None = None) -> None:
-        """An edge of a rotor; `turns` is the rotor's total revolutions where the source tells."""
+        """An edge of a rotor.
+
+        Args:
+            name: The rotor.
+            time_ns: Stamp [ns].
+            turns: The rotor's total revolutions, where the source tells them.
+        """
+        if name not in self._rotors:
+            self._unknown[name] = self._unknown.get(name, 0) + 1
+            return
+        self._take(name, time_ns, (math.nan if turns is None else turns,))
 
     def add_angle(self, name: str, time_ns: int, angle: float) -> None:
         """A reading of a vane: heading of its nose, counter-clockwise from x [rad]."""
+        if name not in self._angles:
+            self._unknown[name] = self._unknown.get(name, 0) + 1
+            return
+        if not math.isfinite(angle):
+            self._intake.records[name].invalid += 1
+            return
+        self._take(name, time_ns, (angle,))
 
     def add_platform(
         self,
         time_ns: int,
-        attitude_xyzw: FloatArray,
-        velocity: FloatArray,
-        angular_rate: FloatArray,
-        position: FloatArray,
+        attitude_xyzw: npt.ArrayLike,
+        velocity: npt.ArrayLike,
+        angular_rate: npt.ArrayLike,
+        position: npt.ArrayLike,
     ) -> None:
-        """State of the carrier, as in `PlatformStates`."""
+        """State of the carrier, as in `PlatformStates`; ignored on a station without platform."""
+        if self.station.platform is None:
+            return
+        value = tuple(
+            float(v)
+            for part in (attitude_xyzw, velocity, angular_rate, position)
+            for v in np.asarray(part, dtype=np.float64)
+        )
+        if not all(math.isfinite(v) for v in value[:10]):
+            self._intake.records[_PLATFORM].invalid += 1
+            return
+        self._take(_PLATFORM, time_ns, value)
 
     def add_air(
         self, time_ns: int, temperature: float | None = None, pressure: float | None = None
     ) -> None:
-        """Air temperature [deg C] or pressure [Pa]."""
+        """Air temperature [deg C], pressure [Pa], or both."""
+        for name, value in ((_TEMPERATURE, temperature), (_PRESSURE, pressure)):
+            if value is None:
+                continue
+            if math.isfinite(value):
+                self._take(name, time_ns, (value,))
+            else:
+                self._intake.records[name].invalid += 1
 
     def advance(self, time_ns: int) -> None:
         """Time has passed although no message came."""
+        self._intake.advance(time_ns)
+        self._process(self._intake.blocks())
 
-    def take_estimates(self) -> list[WindEstimate]:
-        """Estimates that became final since the last call, in order of time."""
+    def _take(self, name: str, time: int, value: tuple[float, ...]) -> None:
+        if self._intake.add(name, time, value):
+            self._finish()
+            self._intake.restart()
+        elif self._intake.is_due():
+            self._process(self._intake.blocks())
 
-    def take_windows(self) -> list[WindowStatistics]:
-        """Windows that were completed since the last call."""
+    def _process(self, blocks: list[Block]) -> None:
+        for block in blocks:
+            core = self._core
+            if core is None:
+                core = self._core = self._new_core()
+            estimates = core.process(block)
+            self._keep(estimates)
+            self._finished += self._windows.take(block, estimates, core.small_scales())
 
-    def health(self) -> list[HealthItem]:
-        """State of every input and of the estimate."""
+    def _keep(self, estimates: Estimates) -> None:
+        if estimates.time.size:
+            self._estimates.append(estimates)
+
+    def _new_core(self) -> Core:
+        origin = self._intake.origin
+        assert origin is not None
+        if self.settings.method == "kalman":
+            return KalmanCore(self.station, self.settings, self._block, origin)
+        if self.settings.method == "inverse":
+            return InverseCore(self.station, self.settings, origin)
+        return NaiveCore(self.station, self.settings, origin)
+
+    def _finish(self) -> None:
+        self._process(self._intake.blocks(finish=True))
+        if self._core is not None:
+            estimates = self._core.finish()
+            self._keep(estimates)
+            self._finished += self._windows.finish(estimates, self._core.small_scales())
+        self._last_health = self._core.health() if self._core is not None else []
+        self._core = None
 
     def flush(self) -> None:
         """No more messages: make everything final, including the last, shorter window."""
+        self._finish()
+        self._intake.forget()
 
     def reset(self) -> None:
         """Forget everything."""
+        self._intake = self._new_intake()
+        self._core = None
+        self._windows = WindowAccumulator(self.station, self.settings)
+        self._estimates.clear()
+        self._finished.clear()
+        self._unknown.clear()
+
+    def take_estimates(self) -> list[WindEstimate]:
+        """Estimates that became final since the last call, in order of time."""
+        block = self.take_estimate_arrays()
+        return [
+            WindEstimate(int(t), v, c, a, ac)
+            for t, v, c, a, ac in zip(
+                block.time,
+                block.velocity,
+                block.covariance,
+                block.apparent,
+                block.apparent_covariance,
+                strict=True,
+            )
+        ]
+
+    def take_estimate_arrays(self) -> Estimates:
+        """The same as `take_estimates`, as arrays."""
+        parts, self._estimates = self._estimates, []
+        return joined(parts)
+
+    def take_windows(self) -> list[WindowStatistics]:
+        """Windows that were completed since the last call."""
+        windows, self._finished = self._finished, []
+        return windows
+
+    def health(self) -> list[HealthItem]:
+        """State of every input, of the clock and of the estimate."""
+        items = input_health(self._intake, self.station, self.settings)
+        items.append(clock_health(self._intake, self._unknown))
+        core = self._core
+        items += core.health() if core is not None else self._last_health
+        return items
+
+
+def make_estimator(
+    station: Station, settings: EstimatorSettings | None = None
+) -> StreamingEstimator:
+    """An estimator for a station.
+
+    Args:
+        station: What is mounted, with what is known to be wrong with it.
+        settings: Method, rates, windows; None: the defaults.
+
+    Raises:
+        UserError: The station has no rotor or no vane.
+    """
+    return StreamingEstimator(station, settings if settings is not None else EstimatorSettings())

@@ -15,13 +15,15 @@ import math
 
 import numpy as np
 
+from wind_sensors.compiled import compiled
+
 PROGRESSION = 5.0
 TIME_CONSTANTS = np.array([0.08, 0.4, 2.0, 10.0])
 """[s]; a slower part is the wandering mean."""
 SMALL_SCALES = 2
 """How many of them obey the small-scale level."""
 VERTICAL_CONSTANTS = np.array([0.08, 0.4, 2.0])
-"""[s]; the ground blocks slower vertical motion."""
+"""[s]; the ground blocks slower vertical motion, the slowest is as strong as height allows."""
 
 SHARE = math.log(PROGRESSION) / (3.0 * math.gamma(1.0 / 3.0))
 """Variance of the process with time constant tau = this times level tau^(2/3)."""
@@ -42,6 +44,21 @@ PAIRS = len(TIME_CONSTANTS) + 1
 WIND_STATES = 2 * PAIRS + len(VERTICAL_CONSTANTS)
 LEVELS = 4
 """Along-wind small and large scales, cross-wind small and large scales."""
+
+
+_FAST_VERTICAL = float(np.sum(VERTICAL_VARIANCES[:-1])) + UNRESOLVED_VARIANCE
+_NEUTRAL_VERTICAL = 0.49
+"""<w^2> = this level (kappa z/U)^(2/3) with the cross-wind level: neutral surface layer,
+<w^2> = 1.46 u_*^2 and eps = u_*^3/(kappa z)."""
+_VON_KARMAN = 0.4
+
+
+@compiled
+def slow_vertical_variance(height: float, speed: float) -> float:
+    """Variance of the slowest vertical process for level 1, at a height [m] and speed [m/s]."""
+    time = _VON_KARMAN * height / max(speed, 1.0)
+    total = _NEUTRAL_VERTICAL * time ** (2.0 / 3.0)
+    return float(min(max(total - _FAST_VERTICAL, 0.0), VERTICAL_VARIANCES[-1]))
 
 
 def initial_levels(speed: float, intensity: float) -> tuple[float, float, float, float]:

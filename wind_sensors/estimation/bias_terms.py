@@ -1,0 +1,125 @@
+"""Biases of the raw mean speed, predicted term by term from the turbulence of a window."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from wind_sensors.estimation.core import SmallScales
+from wind_sensors.estimation.outputs import BiasTerm
+from wind_sensors.instruments.dynamics.rotor import table_at
+from wind_sensors.instruments.propeller_vane import inertial_delta
+from wind_sensors.instruments.speed_bias import inertial_bias
+from wind_sensors.instruments.vane_variance import inertial_loss
+from wind_sensors.station.model import Cup, Propeller, Vane
+from wind_sensors.station.parameters import rotor_parameters
+from wind_sensors.turbulence.inertial_range import (
+    KOLMOGOROV_CONSTANT,
+    LONGITUDINAL_STRUCTURE_COEFFICIENT,
+    one_sided_longitudinal_constant,
+)
+
+_LEVEL_UNCERTAINTY = 0.2
+"""Relative, of an inertial-range level and of a4 together."""
+_VERTICAL_UNCERTAINTY = 0.4
+"""Relative: the vertical variance is inferred, not measured."""
+_CURVATURE_ANGLE = math.radians(20.0)
+"""Where an angular-response table is compared with a parabola."""
+
+
+class WindowTurbulence(NamedTuple):
+    """Turbulence of a window.
+
+    Attributes:
+        speed: Scalar mean [m/s].
+        vector_speed: Speed of the vector mean [m/s].
+        vertical_variance: [m^2/s^2].
+        small_scales: Inertial range.
+    """
+
+    speed: float
+    vector_speed: float
+    vertical_variance: float
+    small_scales: SmallScales
+
+
+def dissipation(level: float, speed: float) -> float:
+    """eps [m^2/s^3] from D(t) = level t^(2/3), with r = U t (Taylor); K14 (44)."""
+    coefficient = LONGITUDINAL_STRUCTURE_COEFFICIENT * KOLMOGOROV_CONSTANT
+    return math.pow(max(level, 0.0) / coefficient, 1.5) / speed
+
+
+def response_curvature(rotor: Cup | Propeller) -> float:
+    """mu2 of a rotor: of the table's parabola where the propeller has a table."""
+    if isinstance(rotor, Cup):
+        return rotor.mu2
+    if rotor.mu2 is not None:
+        return rotor.mu2
+    theta = _CURVATURE_ANGLE
+    response = table_at(rotor_parameters(rotor).angular_response, theta)
+    return 2.0 * (response - math.cos(theta)) / theta**2
+
+
+def vane_loss(vane: Vane, turbulence: WindowTurbulence) -> float:
+    """<v^2> - U^2 <phi^2> [m^2/s^2] that the vane does not show; K94 (54)."""
+    across = dissipation(0.75 * turbulence.small_scales.across, turbulence.speed)
+    return inertial_loss(
+        vane.distance_constant, vane.damping_ratio, across, one_sided_longitudinal_constant()
+    )
+
+
+def _translation(rotor: Propeller, vane: Vane, mu2: float, eps: float, speed: float) -> float:
+    """Part of the propeller-vane's bias that its distance from the axis makes; K94 (110)."""
+    arm = rotor.distance_to_vane_axis / vane.distance_constant
+    alpha_1 = one_sided_longitudinal_constant()
+
+    def delta(ratio: float) -> float:
+        return inertial_delta(
+            vane.damping_ratio, ratio, mu2, vane.distance_constant, eps, alpha_1, speed
+        )
+
+    return delta(arm) - delta(0.0)
+
+
+def predicted_terms(
+    rotor: Cup | Propeller, vane: Vane, turbulence: WindowTurbulence, arithmetic_mean: float
+) -> dict[str, BiasTerm]:
+    """Terms relative to the mean speed.
+
+    Args:
+        rotor, vane: The instruments.
+        turbulence: Of the window.
+        arithmetic_mean: Excess of the mean over revolutions over the mean over time [1], exact;
+            K94 (28).
+
+    Returns:
+        u (overspeeding), v (speed against vector mean), w (angular response), vane_lag (what the
+        vane does not follow), translation (the propeller moves with the vane), arithmetic_mean.
+    """
+    speed = max(turbulence.speed, 0.1)
+    mu2 = response_curvature(rotor)
+    eps = dissipation(turbulence.small_scales.along, speed)
+    local = inertial_bias(
+        rotor.distance_constant * rotor.inertia_factor, eps, speed, 0.0,
+        turbulence.vertical_variance, rotor.a4, 0.0, mu2,
+    )  # fmt: skip
+    across = dissipation(0.75 * turbulence.small_scales.across, speed)
+    translation = 0.0
+    if isinstance(rotor, Propeller) and rotor.mounted_on:
+        lag = inertial_delta(
+            vane.damping_ratio, 0.0, mu2, vane.distance_constant, across,
+            one_sided_longitudinal_constant(), speed,
+        )  # fmt: skip
+        translation = _translation(rotor, vane, mu2, across, speed)
+    else:
+        lag = 0.5 * vane_loss(vane, turbulence) / speed**2
+    vector = max(turbulence.vector_speed, 0.1)
+    v_term = turbulence.speed / vector - 1.0
+    return {
+        "u": BiasTerm(local.u, _LEVEL_UNCERTAINTY * abs(local.u)),
+        "v": BiasTerm(v_term, 0.05 * abs(v_term)),
+        "w": BiasTerm(local.w, _VERTICAL_UNCERTAINTY * abs(local.w)),
+        "vane_lag": BiasTerm(lag, _LEVEL_UNCERTAINTY * abs(lag)),
+        "translation": BiasTerm(translation, _LEVEL_UNCERTAINTY * abs(translation)),
+        "arithmetic_mean": BiasTerm(arithmetic_mean, 0.0),
+    }

@@ -1,0 +1,207 @@
+"""Motion of the mount and state of the air at the instants of the events."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.estimation import forward
+from wind_sensors.estimation.intake import Block
+from wind_sensors.motion import Motion, PlatformTrack, TrackLimits, rotations, true_motion
+from wind_sensors.motion.relative_wind import rotor_downwash, sensor_rotation, sensor_velocity
+from wind_sensors.station.model import Clock, Platform, Station
+from wind_sensors.station.signals import PlatformStates
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+GAS_CONSTANT_DRY_AIR = 287.05
+"""[J kg^-1 K^-1]"""
+STANDARD_PRESSURE = 101_325.0
+"""[Pa]"""
+STANDARD_DENSITY = 1.225
+"""[kg/m^3]"""
+STANDARD_TEMPERATURE = 15.0
+"""[deg C]"""
+STANDARD_GRAVITY = 9.80665
+"""[m/s^2]"""
+_KEPT_STATES = 50
+_GUESSWORK_VELOCITY = 5.0
+_GUESSWORK_ATTITUDE = 1.0
+"""Standard deviations [m/s, rad] where the platform's motion would be guesswork."""
+
+
+class CircumstanceSource:
+    """Remembers the latest platform states and air, and reads them at any instant of a block.
+
+    Args:
+        station: The station, without changes.
+        use_air: Use measured temperature and pressure.
+    """
+
+    def __init__(self, station: Station, use_air: bool) -> None:
+        self._use_air = use_air
+        self._platform_states: FloatArray = np.empty((0, 13))
+        self._platform_times: TimeArray = np.empty(0, dtype=np.int64)
+        self._temperature = np.nan
+        self._pressure = np.nan
+        self.guesswork = 0
+        self.station = station
+        heading = float(np.radians(station.sensor_heading_deg))
+        turn = rotations.matrix(rotations.from_roll_pitch_yaw(0.0, 0.0, heading))
+        self._mast_rotation: FloatArray = turn.ravel()
+
+    @property
+    def known(self) -> bool:
+        """Whether the carrier has been heard of, if there is one."""
+        return self.station.platform is None or self._platform_times.size > 0
+
+    def take(self, block: Block) -> None:
+        """Remember what a block says about mount and air."""
+        if block.temperature.time.size:
+            self._temperature = float(block.temperature.value[-1, 0])
+        if block.pressure.time.size:
+            self._pressure = float(block.pressure.value[-1, 0])
+        new = block.platform
+        if new.time.size:
+            old = self._platform_times < new.time[0]
+            self._platform_times = np.concatenate((self._platform_times[old], new.time))
+            self._platform_states = np.concatenate((self._platform_states[old], new.value))
+            self._platform_times = self._platform_times[-_KEPT_STATES - new.time.size :]
+            self._platform_states = self._platform_states[-_KEPT_STATES - new.time.size :]
+
+    def _air(self, rows: FloatArray) -> None:
+        rows[:, forward.AIR_TEMPERATURE] = STANDARD_TEMPERATURE
+        rows[:, forward.AIR_DENSITY] = self.station.instruments[0].reference_density
+        if not self._use_air:
+            return
+        if np.isfinite(self._temperature):
+            rows[:, forward.AIR_TEMPERATURE] = self._temperature
+            pressure = self._pressure if np.isfinite(self._pressure) else STANDARD_PRESSURE
+            kelvin = self._temperature + 273.15
+            rows[:, forward.AIR_DENSITY] = pressure / (GAS_CONSTANT_DRY_AIR * kelvin)
+
+    def at(self, times: TimeArray, wind: FloatArray) -> FloatArray:
+        """Circumstances at the times of events.
+
+        Args:
+            times: [ns], shape (n,).
+            wind: Latest estimate of the wind, ENU [m/s], shape (3,); only a multirotor's downwash
+                needs it.
+
+        Returns:
+            Shape (n, 19), see `forward`.
+        """
+        rows = np.zeros((times.size, forward.CIRCUMSTANCES))
+        self._air(rows)
+        platform = self.station.platform
+        if platform is None:
+            rows[:, 3:12] = self._mast_rotation
+        elif self._platform_times.size and times.size:
+            self._moving(rows, times, platform, wind)
+        else:
+            rows[:, 3:12] = np.eye(3).ravel()
+            rows[:, forward.VELOCITY_VARIANCE] = _GUESSWORK_VELOCITY**2
+            rows[:, forward.ATTITUDE_VARIANCE] = _GUESSWORK_ATTITUDE**2
+        return rows
+
+    def _moving(
+        self, rows: FloatArray, times: TimeArray, platform: Platform, wind: FloatArray
+    ) -> None:
+        states = self._platform_states
+        track = PlatformTrack(
+            PlatformStates(
+                time=self._platform_times,
+                attitude=states[:, 0:4],
+                velocity=states[:, 4:7],
+                angular_rate=states[:, 7:10],
+                position=states[:, 10:13],
+            ),
+            TrackLimits(
+                attitude_deviation=float(np.radians(platform.attitude_noise_deg)),
+                velocity_deviation=platform.velocity_noise,
+            ),
+        )
+        sample = track.at(times)
+        motion = true_motion(replace_clock(platform), sample.motion, 1.0)
+        rotation = sensor_rotation(platform)
+        arm = self._lever_arm(platform, rotation)
+        moving = platform.velocity_share * sensor_velocity(motion, arm)
+        if platform.downwash.induced_velocity != 0.0:
+            felt = np.einsum("nji,j->ni", motion.to_earth, wind) - moving
+            moving = moving - rotor_downwash(platform.downwash, felt)
+        rows[:, 0:3] = np.einsum("nij,nj->ni", motion.to_earth, moving)
+        rows[:, 3:12] = np.einsum("nij,jk->nik", motion.to_earth, rotation).reshape(-1, 9)
+        rows[:, forward.MOUNT_YAW_RATE] = motion.angular_rate @ rotation[:, 2]
+        if any(getattr(i, "imbalance", 0.0) for i in self.station.instruments):
+            felt_gravity = self._gravity(track, platform, arm, rotation, times)
+            rows[:, forward.MOUNT_GRAVITY_X] = felt_gravity[:, 0]
+            rows[:, forward.MOUNT_GRAVITY_Y] = felt_gravity[:, 1]
+        guess = ~sample.known
+        self.guesswork += int(np.count_nonzero(guess))
+        rows[:, forward.VELOCITY_VARIANCE] = np.where(
+            guess, _GUESSWORK_VELOCITY**2, sample.velocity_variance
+        )
+        rows[:, forward.ATTITUDE_VARIANCE] = np.where(
+            guess, _GUESSWORK_ATTITUDE**2, sample.attitude_variance
+        )
+
+    def _lever_arm(self, platform: Platform, rotation: FloatArray) -> FloatArray:
+        """The first instrument's place in platform axes [m]; the others stand close to it."""
+        place = np.asarray(self.station.instruments[0].position)
+        arm: FloatArray = np.asarray(platform.sensor_position) + rotation @ place
+        return arm
+
+    def _gravity(
+        self,
+        track: PlatformTrack,
+        platform: Platform,
+        arm: FloatArray,
+        rotation: FloatArray,
+        times: TimeArray,
+    ) -> FloatArray:
+        """Gravity minus the sensor's acceleration in sensor axes [m/s^2], shape (n, 3)."""
+        half = 20_000_000
+
+        def earth_velocity(at: TimeArray) -> tuple[FloatArray, Motion]:
+            motion = true_motion(replace_clock(platform), track.at(at).motion, 1.0)
+            return np.einsum("nij,nj->ni", motion.to_earth, sensor_velocity(motion, arm)), motion
+
+        before, _ = earth_velocity(times - half)
+        after, _ = earth_velocity(times + half)
+        _, motion = earth_velocity(times)
+        force = -(after - before) / (2.0 * half * 1e-9)
+        force[:, 2] -= STANDARD_GRAVITY
+        felt: FloatArray = np.einsum("nji,nj->ni", motion.to_earth, force) @ rotation
+        return felt
+
+
+def replace_clock(platform: Platform) -> Platform:
+    """The platform with a true clock: the intake has already corrected the stamps."""
+    if platform.clock == Clock():
+        return platform
+    return platform.model_copy(update={"clock": Clock()})
+
+
+def with_mount_covariance(
+    covariance: FloatArray, wind: FloatArray, rows: FloatArray
+) -> FloatArray:
+    """Add what attitude and velocity of the mount contribute to the earth wind's covariance.
+
+    The earth wind is R (apparent + velocity) with both vectors measured on the platform, so that a
+    small rotation of R turns it as a whole.
+
+    Args:
+        covariance: [m^2/s^2], shape (n, 3, 3).
+        wind: ENU [m/s], shape (n, 3).
+        rows: Circumstances, shape (n, 19).
+
+    Returns:
+        Shape (n, 3, 3).
+    """
+    velocity = rows[:, forward.VELOCITY_VARIANCE][:, np.newaxis, np.newaxis]
+    attitude = rows[:, forward.ATTITUDE_VARIANCE][:, np.newaxis, np.newaxis]
+    size2 = np.einsum("ni,ni->n", wind, wind)[:, np.newaxis, np.newaxis]
+    outer = wind[:, :, np.newaxis] * wind[:, np.newaxis, :]
+    total: FloatArray = covariance + velocity * np.eye(3) + attitude * (size2 * np.eye(3) - outer)
+    return total

@@ -1,0 +1,346 @@
+"""Messages into order: the stamps alone decide, whatever the order of arrival.
+
+Messages wait until every message of their block must have arrived, then the whole block is
+released, sorted and without doubles. The clock is the largest stamp seen (or told by `advance`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+PULSES, READINGS, PLATFORM, TEMPERATURE, PRESSURE = range(5)
+_CONFIRMED = 3
+"""So many messages in a row make a jump of the clock believable."""
+_FAR_AHEAD_NS = 60_000_000_000
+
+
+class Series(NamedTuple):
+    """One input's messages in a block: times [ns] (n,) and values (n, width), nan where absent."""
+
+    time: TimeArray
+    value: FloatArray
+
+
+@dataclass(frozen=True)
+class Block:
+    """All messages of an interval, in order.
+
+    Attributes:
+        start, stop: The interval [ns].
+        pulses: By rotor; the value is the turns where the source tells.
+        readings: By vane (`<bivane>/elevation` for elevations) [rad].
+        platform: States, some of them shortly after `stop`: attitude xyzw, velocity, angular rate,
+            position; width 13.
+        temperature: [deg C].
+        pressure: [Pa].
+    """
+
+    start: int
+    stop: int
+    pulses: dict[str, Series]
+    readings: dict[str, Series]
+    platform: Series
+    temperature: Series
+    pressure: Series
+
+
+@dataclass
+class InputRecord:
+    """What is known about one input; counts since the start.
+
+    Attributes:
+        kind: PULSES, READINGS, ...
+        width: Numbers in a message.
+        accepted, doubled, late, invalid, gaps: Counts.
+        longest_gap: [s].
+        first, last: Times of the first and the last released message [ns], 0 without any.
+        rate: Recent rate [Hz].
+    """
+
+    kind: int
+    width: int
+    accepted: int = 0
+    doubled: int = 0
+    late: int = 0
+    invalid: int = 0
+    gaps: int = 0
+    longest_gap: float = 0.0
+    first: int = 0
+    last: int = 0
+    rate: float = 0.0
+    times: list[int] = field(default_factory=list)
+    values: list[tuple[float, ...]] = field(default_factory=list)
+
+
+Correction = Callable[[int, int], int]
+"""Stamp and start of the recording to the time of measurement [ns]."""
+
+
+class Intake:
+    """Buffer in front of an estimator.
+
+    Args:
+        inputs: Kind, width and clock correction by input name.
+        block_ns: Length of a block.
+        wait_ns: How long to wait for messages that arrive late.
+        look_ahead_ns: How much of the platform's motion after a block is released with it.
+        gap_ns: Silence that counts as a gap.
+        jump_ns: Step back of the clock that counts as a jump.
+    """
+
+    def __init__(
+        self,
+        inputs: dict[str, tuple[int, int, Correction | None]],
+        block_ns: int,
+        wait_ns: int,
+        look_ahead_ns: int,
+        gap_ns: int,
+        jump_ns: int,
+    ) -> None:
+        self.records = {name: InputRecord(kind, width) for name, (kind, width, _) in inputs.items()}
+        self._corrections = {name: c for name, (_, _, c) in inputs.items() if c is not None}
+        self._block = block_ns
+        self._wait = wait_ns
+        self._look_ahead = look_ahead_ns
+        self._gap = gap_ns
+        self._jump = jump_ns
+        self.jumps = 0
+        self.far_ahead = 0
+        self.watermark = 0
+        self.origin: int | None = None
+        self.released = 0
+        self._earliest = 0
+        self._seen = False
+        self._early: list[tuple[str, int, tuple[float, ...]]] = []
+        self._astray: list[tuple[str, int, tuple[float, ...]]] = []
+
+    def forget(self) -> None:
+        """Start anew with the next message; counts stay."""
+        for record in self.records.values():
+            record.times.clear()
+            record.values.clear()
+        self.origin = None
+        self.released = 0
+        self.watermark = 0
+        self._seen = False
+        self._early.clear()
+        self._astray.clear()
+
+    def add(self, name: str, time: int, value: tuple[float, ...]) -> bool:
+        """Take a message; True: the clock has jumped, finish and `restart`."""
+        if self._seen:
+            ahead = time - self.watermark
+            if ahead < -self._jump or ahead > _FAR_AHEAD_NS:
+                return self._is_jump(name, time, value)
+            self._astray.clear()
+            if ahead > 0:
+                self.watermark = time
+        else:
+            self._seen = True
+            self.watermark = self._earliest = time
+        self._keep(name, time, value)
+        return False
+
+    def advance(self, time: int) -> None:
+        """Time has passed although no message came."""
+        if self._seen and time > self.watermark and time - self.watermark < _FAR_AHEAD_NS:
+            self.watermark = time
+
+    def _is_jump(self, name: str, time: int, value: tuple[float, ...]) -> bool:
+        if self._astray and abs(time - self._astray[-1][1]) > self._jump:
+            self._astray.clear()
+        self._astray.append((name, time, value))
+        if len(self._astray) < _CONFIRMED:
+            self.far_ahead += 1
+            return False
+        self.jumps += 1
+        return True
+
+    def restart(self) -> None:
+        """After a jump: forget, and begin with the messages that proved it."""
+        proof = list(self._astray)
+        self.far_ahead -= len(proof) - 1
+        self.forget()
+        for name, time, value in proof:
+            self.add(name, time, value)
+
+    def _keep(self, name: str, time: int, value: tuple[float, ...]) -> None:
+        if self.origin is None:
+            self._early.append((name, time, value))
+            self._earliest = min(self._earliest, time)
+            return
+        record = self.records[name]
+        correction = self._corrections.get(name)
+        if correction is not None:
+            time = correction(time, self.origin)
+        if time < self.released:
+            record.late += 1
+            return
+        record.times.append(time)
+        record.values.append(value)
+
+    def is_due(self) -> bool:
+        """Whether `blocks` would have something to release."""
+        if self.origin is None:
+            return self.watermark >= self._earliest + self._wait
+        return self.watermark >= self.released + self._block + self._wait + self._look_ahead
+
+    def blocks(self, finish: bool = False) -> list[Block]:
+        """Blocks that are complete; with `finish` everything that is left."""
+        if not self._seen:
+            return []
+        wait = 0 if finish else self._wait
+        if self.origin is None:
+            start = self._earliest
+            if not finish and self.watermark < start + self._wait:
+                return []
+            self.origin = start
+            early, self._early = self._early, []
+            corrected = [
+                self._corrections[n](t, start) if n in self._corrections else t
+                for n, t, _ in early
+            ]
+            self.released = min(corrected) // self._block * self._block
+            for name, time, value in early:
+                self._keep(name, time, value)
+        out = []
+        last = self.watermark - wait - (0 if finish else self._look_ahead)
+        while self.released + self._block <= last or (finish and self.released <= last):
+            out.append(self._release(self.released + self._block))
+        return out
+
+    def _release(self, stop: int) -> Block:
+        start = self.released
+        parts = {name: self._taken(record, stop) for name, record in self.records.items()}
+        self.released = stop
+        seconds = self._block * 1e-9
+        for name, record in self.records.items():
+            self._account(record, parts[name], seconds)
+        return Block(
+            start=start,
+            stop=stop,
+            pulses=self._of_kind(PULSES, parts),
+            readings=self._of_kind(READINGS, parts),
+            platform=self._single(PLATFORM, parts, stop + self._look_ahead),
+            temperature=self._single(TEMPERATURE, parts, stop),
+            pressure=self._single(PRESSURE, parts, stop),
+        )
+
+    def _of_kind(self, kind: int, parts: dict[str, Series]) -> dict[str, Series]:
+        return {n: parts[n] for n, r in self.records.items() if r.kind == kind}
+
+    def _single(self, kind: int, parts: dict[str, Series], until: int) -> Series:
+        for name, record in self.records.items():
+            if record.kind != kind:
+                continue
+            if kind == PLATFORM and record.times:
+                ahead = _sorted(
+                    [t for t in record.times if t < until],
+                    [v for t, v in zip(record.times, record.values, strict=True) if t < until],
+                    record.width,
+                )[0]
+                part = parts[name]
+                return Series(
+                    np.concatenate((part.time, ahead.time)),
+                    np.concatenate((part.value, ahead.value)),
+                )
+            return parts[name]
+        return Series(np.empty(0, dtype=np.int64), np.empty((0, 1)))
+
+    @staticmethod
+    def _taken(record: InputRecord, stop: int) -> Series:
+        times, values = record.times, record.values
+        if not times:
+            return Series(np.empty(0, dtype=np.int64), np.empty((0, record.width)))
+        if max(times) < stop:
+            taken_times, taken_values = times, values
+            record.times, record.values = [], []
+        else:
+            taken_times = [t for t in times if t < stop]
+            taken_values = [v for t, v in zip(times, values, strict=True) if t < stop]
+            record.values = [v for t, v in zip(times, values, strict=True) if t >= stop]
+            record.times = [t for t in times if t >= stop]
+        series, doubled = _sorted(taken_times, taken_values, record.width)
+        record.doubled += doubled
+        return series
+
+    def _account(self, record: InputRecord, part: Series, seconds: float) -> None:
+        count = int(part.time.size)
+        share = min(1.0, seconds / 5.0) if record.rate > 0.0 else 1.0
+        record.rate += share * (count / seconds - record.rate)
+        if count == 0:
+            return
+        record.accepted += count
+        times = part.time
+        before = record.last if record.last else int(times[0])
+        if before > times[0]:
+            before = int(times[0])
+        silent = np.diff(times, prepend=before)
+        longest = int(silent.max())
+        if longest > self._gap:
+            record.gaps += int(np.count_nonzero(silent > self._gap))
+            record.longest_gap = max(record.longest_gap, longest * 1e-9)
+        if not record.first:
+            record.first = int(times[0])
+        record.last = int(times[-1])
+
+
+def merged(blocks: list[Block]) -> Block:
+    """Successive blocks as one."""
+
+    def series(parts: list[Series]) -> Series:
+        return Series(
+            np.concatenate([p.time for p in parts]), np.concatenate([p.value for p in parts])
+        )
+
+    if len(blocks) == 1:
+        return blocks[0]
+    platform = series([b.platform for b in blocks])
+    times, first = np.unique(platform.time, return_index=True)
+    return Block(
+        start=blocks[0].start,
+        stop=blocks[-1].stop,
+        pulses={n: series([b.pulses[n] for b in blocks]) for n in blocks[0].pulses},
+        readings={n: series([b.readings[n] for b in blocks]) for n in blocks[0].readings},
+        platform=Series(times, platform.value[first]),
+        temperature=series([b.temperature for b in blocks]),
+        pressure=series([b.pressure for b in blocks]),
+    )
+
+
+def _sorted(
+    times: list[int], values: list[tuple[float, ...]], width: int
+) -> tuple[Series, int]:
+    """In order of time, doubles dropped (the smallest value stays); and how many those were."""
+    t = np.array(times, dtype=np.int64)
+    v = np.array(values, dtype=np.float64).reshape(len(times), width)
+    if t.size < 2:
+        return Series(t, v), 0
+    if not np.all(t[1:] > t[:-1]):
+        order = np.lexsort((v[:, 0], t)) if width else np.argsort(t, kind="stable")
+        t, v = t[order], v[order]
+        first = np.concatenate(([True], t[1:] != t[:-1]))
+        doubled = int(t.size - np.count_nonzero(first))
+        return Series(t[first], v[first]), doubled
+    return Series(t, v), 0
+
+
+def clock_correction(latency: float, drift: float) -> Correction | None:
+    """How stamps become times of measurement; None where they already are."""
+    if latency == 0.0 and drift == 0.0:
+        return None
+
+    def corrected(stamp: int, origin: int) -> int:
+        since = (stamp - origin) - latency * 1e9
+        return origin + math.floor(since / (1.0 + drift) + 0.5)
+
+    return corrected

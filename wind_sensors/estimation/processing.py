@@ -1,0 +1,143 @@
+"""The streaming estimator over a whole recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.errors import UserError
+from wind_sensors.estimation.outputs import ProcessedRecording
+from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.streaming import StreamingEstimator, make_estimator
+from wind_sensors.station.signals import Recording
+
+TimeArray = npt.NDArray[np.int64]
+
+_Feed = Callable[[int], None]
+
+
+def _stretches(time: TimeArray, jump_ns: int) -> list[tuple[int, int]]:
+    """Index ranges between steps back of the clock."""
+    if time.size == 0:
+        return []
+    cuts = np.nonzero(np.diff(time) < -jump_ns)[0] + 1
+    edges = [0, *(int(c) for c in cuts), int(time.size)]
+    return list(pairwise(edges))
+
+
+def _inputs(
+    estimator: StreamingEstimator, recording: Recording
+) -> list[tuple[TimeArray, _Feed]]:
+    """Times of each input and what to do with its i-th message."""
+    inputs: list[tuple[TimeArray, _Feed]] = []
+
+    def pulses(name: str, time: list[int], turns: list[float] | None) -> _Feed:
+        if turns is None:
+            return lambda i: estimator.add_pulse(name, time[i])
+        return lambda i: estimator.add_pulse(name, time[i], turns[i])
+
+    def angles(name: str, time: list[int], angle: list[float]) -> _Feed:
+        return lambda i: estimator.add_angle(name, time[i], angle[i])
+
+    for name, p in recording.pulses.items():
+        turns = None if p.turns is None else p.turns.tolist()
+        inputs.append((p.time, pulses(name, p.time.tolist(), turns)))
+    for name, a in recording.angles.items():
+        inputs.append((a.time, angles(name, a.time.tolist(), a.angle.tolist())))
+    states = recording.platform
+    if states is not None:
+        times = states.time.tolist()
+
+        def platform(i: int) -> None:
+            estimator.add_platform(
+                times[i], states.attitude[i], states.velocity[i], states.angular_rate[i],
+                states.position[i],
+            )  # fmt: skip
+
+        inputs.append((states.time, platform))
+    if recording.temperature is not None:
+        warmth = recording.temperature
+        inputs.append(
+            (
+                warmth.time,
+                lambda i: estimator.add_air(int(warmth.time[i]), temperature=warmth.value[i]),
+            )
+        )
+    if recording.pressure is not None:
+        weight = recording.pressure
+        inputs.append(
+            (
+                weight.time,
+                lambda i: estimator.add_air(int(weight.time[i]), pressure=weight.value[i]),
+            )
+        )
+    return inputs
+
+
+def _in_order(
+    inputs: list[tuple[TimeArray, _Feed]], jump_ns: int
+) -> Iterator[tuple[_Feed, int]]:
+    """Messages as they came: by time, and turn after turn where the clock jumps back."""
+    parts = [_stretches(time, jump_ns) for time, _ in inputs]
+    for turn in range(max((len(p) for p in parts), default=0)):
+        times, which, index = [], [], []
+        for k, (time, _) in enumerate(inputs):
+            if turn < len(parts[k]):
+                first, last = parts[k][turn]
+                times.append(np.maximum.accumulate(time[first:last]))
+                which.append(np.full(last - first, k))
+                index.append(np.arange(first, last))
+        order = np.argsort(np.concatenate(times), kind="stable")
+        sources = np.concatenate(which)[order].tolist()
+        places = np.concatenate(index)[order].tolist()
+        for k, i in zip(sources, places, strict=True):
+            yield inputs[k][1], i
+
+
+def process(
+    recording: Recording,
+    settings: EstimatorSettings | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> ProcessedRecording:
+    """Run a streaming estimator over a recording.
+
+    Args:
+        recording: Station and signals.
+        settings: Method, rates, windows; None: the defaults.
+        progress: Called now and then with the share that is done, 0 to 1.
+
+    Returns:
+        All estimates, windows and the health at the end.
+
+    Raises:
+        UserError: The station lacks a rotor or a vane, or the recording has no signals.
+    """
+    chosen = settings if settings is not None else EstimatorSettings()
+    estimator = make_estimator(recording.station, chosen)
+    inputs = _inputs(estimator, recording)
+    total = sum(int(time.size) for time, _ in inputs)
+    if total == 0:
+        raise UserError("The recording has no signals of its station.", recording.name)
+    for done, (feed, index) in enumerate(_in_order(inputs, round(chosen.jump_time * 1e9))):
+        feed(index)
+        if done % 4096 == 0 and progress is not None:
+            progress(done / total)
+    estimator.flush()
+    found = estimator.take_estimate_arrays()
+    windows = estimator.take_windows()
+    if progress is not None:
+        progress(1.0)
+    return ProcessedRecording(
+        recording=recording,
+        method=chosen.method,
+        time=found.time,
+        velocity=found.velocity,
+        covariance=found.covariance,
+        apparent=found.apparent,
+        apparent_covariance=found.apparent_covariance,
+        windows=tuple(windows),
+        health=tuple(estimator.health()),
+    )

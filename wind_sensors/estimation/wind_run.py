@@ -1,0 +1,137 @@
+"""Raw sums of one averaging window: wind run by direction, as a logger would keep them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.estimation.circumstances import CircumstanceSource
+from wind_sensors.estimation.forward import MOUNT_ROTATION
+from wind_sensors.estimation.history import History
+from wind_sensors.estimation.intake import Block, merged
+from wind_sensors.station.model import Cup, Station
+
+_TOGETHER = 20
+"""So many blocks are summed at once."""
+
+FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
+
+
+@dataclass
+class RunSums:
+    """Sums over one window.
+
+    Attributes:
+        turned: Angle turned by the rotor [rad].
+        edges: Edges or counter readings.
+        directions: Sum of the air's unit vector, weighted by angle turned [rad], shape (2,).
+        readings: Number of vane readings.
+        time_directions: Sum of the air's unit vector over the readings, shape (2,).
+        rates, intervals, interval_time, interval_turned: Sum of the rotor's rates over the
+            intervals between edges [rad/s], their number, duration [s] and angle [rad]; for the
+            arithmetic mean.
+        carried: Sum of the mount's velocity over the readings [m/s], shape (2,).
+    """
+
+    turned: float = 0.0
+    edges: int = 0
+    directions: FloatArray = field(default_factory=lambda: np.zeros(2))
+    readings: int = 0
+    time_directions: FloatArray = field(default_factory=lambda: np.zeros(2))
+    rates: float = 0.0
+    intervals: int = 0
+    interval_time: float = 0.0
+    interval_turned: float = 0.0
+    carried: FloatArray = field(default_factory=lambda: np.zeros(2))
+
+
+class RunCounter:
+    """Sorts messages into windows that follow one another and keeps their sums.
+
+    Args:
+        station: The station; the first rotor and the vane that belongs to it are used.
+        start: Of the first window [ns].
+        length: Of a window [ns].
+        use_air: As in the settings.
+    """
+
+    def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
+        self.history = History(station, start, 1.0)
+        self._source = CircumstanceSource(station, use_air)
+        self._start = start
+        self._length = length
+        self._last_time = 0
+        self._last_angle = 0.0
+        self._sums: dict[int, RunSums] = {}
+        self._pending: list[Block] = []
+
+    @property
+    def starting_speed(self) -> float:
+        """Calibration offset [m/s]."""
+        rotor = self.history.rotor
+        return rotor.starting_speed if isinstance(rotor, Cup) else 0.0
+
+    def take(self, block: Block) -> None:
+        """Add a block; some are kept and summed together."""
+        self._pending.append(block)
+        if len(self._pending) >= _TOGETHER:
+            self._sum_up()
+
+    def window(self, number: int) -> RunSums:
+        """Sums of a window, which is forgotten."""
+        self._sum_up()
+        return self._sums.pop(number, RunSums())
+
+    def _directions(self, times: TimeArray, heading: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Unit vector of the air in ENU (horizontal part) and the mount's velocity, (n, 2) each."""
+        rows = self._source.at(times, np.zeros(3))
+        to_earth = rows[:, MOUNT_ROTATION : MOUNT_ROTATION + 9].reshape(-1, 3, 3)
+        local = np.stack((-np.cos(heading), -np.sin(heading), np.zeros_like(heading)), axis=1)
+        return np.einsum("nij,nj->ni", to_earth, local)[:, :2], rows[:, :2]
+
+    def _sum_up(self) -> None:
+        if not self._pending:
+            return
+        block = merged(self._pending)
+        self._pending = []
+        h = self.history
+        self._source.take(block)
+        readings, edges = h.take(block)
+        if readings:
+            times, heading = h.vane_time[-readings:], h.heading[-readings:]
+            unit, carried = self._directions(times, heading)
+            for sums, part in self._windows(times):
+                sums.readings += int(np.count_nonzero(part))
+                sums.time_directions += unit[part].sum(axis=0)
+                sums.carried += carried[part].sum(axis=0)
+        if edges and h.vane_time.size:
+            self._sum_edges(h.edge_time[-edges:], h.edge_angle[-edges:])
+        h.forget_before(block.stop)
+
+    def _sum_edges(self, times: TimeArray, angle: FloatArray) -> None:
+        h = self.history
+        if self._last_time == 0:
+            self._last_time, self._last_angle = int(times[0]), float(angle[0])
+        turned = np.diff(angle, prepend=self._last_angle)
+        dt = np.diff(times, prepend=self._last_time) * 1e-9
+        self._last_time, self._last_angle = int(times[-1]), float(angle[-1])
+        unit, _ = self._directions(times, np.interp(times, h.vane_time, h.heading))
+        for sums, part in self._windows(times):
+            sums.edges += int(np.count_nonzero(part))
+            sums.turned += float(turned[part].sum())
+            sums.directions += (unit[part] * turned[part, np.newaxis]).sum(axis=0)
+            moving = part & (dt > 0.0) & (turned > 0.0)
+            sums.rates += float((turned[moving] / dt[moving]).sum())
+            sums.intervals += int(np.count_nonzero(moving))
+            sums.interval_time += float(dt[moving].sum())
+            sums.interval_turned += float(turned[moving].sum())
+
+    def _windows(self, times: TimeArray) -> list[tuple[RunSums, npt.NDArray[np.bool_]]]:
+        """The sums of each window that the times fall into, and which of them do."""
+        number = (times - self._start) // self._length
+        return [
+            (self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)
+        ]

@@ -1,0 +1,219 @@
+"""Statistics over averaging windows, streaming: raw wind run against the estimated wind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.estimation.bias_terms import WindowTurbulence, predicted_terms, vane_loss
+from wind_sensors.estimation.core import Estimates, SmallScales
+from wind_sensors.estimation.intake import Block
+from wind_sensors.estimation.outputs import WindowStatistics
+from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.wind_run import RunCounter, RunSums
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+_CORRECTION_UNCERTAINTY = 0.25
+"""Relative standard uncertainty of the correction as a whole: a4, angular response, levels."""
+_CALIBRATION_UNCERTAINTY = 0.002
+"""Relative, of a calibration laboratory."""
+_CORRELATION_TIME = 1.0
+"""Errors of estimates further apart are independent [s]."""
+
+
+@dataclass
+class _Sums:
+    """Sums over the estimates of a window."""
+
+    count: int = 0
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
+    products: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    own_trace: float = 0.0
+    speed: float = 0.0
+    along: float = 0.0
+    across: float = 0.0
+    blocks: int = 0
+
+
+class WindowAccumulator:
+    """Collects blocks and estimates into windows that follow one another.
+
+    Args:
+        station: The station.
+        settings: `window` and `output_rate` matter.
+    """
+
+    def __init__(self, station: Station, settings: EstimatorSettings) -> None:
+        self._station = station
+        self._settings = settings
+        self._length = round(settings.window * 1e9)
+        self._counter: RunCounter | None = None
+        self._start = 0
+        self._last = 0
+        self._number = 0
+        self._sums = _Sums()
+
+    def take(
+        self, block: Block, estimates: Estimates, small: SmallScales | None
+    ) -> list[WindowStatistics]:
+        """Add a block and the estimates that became final with it; windows that are complete."""
+        if self._counter is None:
+            self._counter = RunCounter(
+                self._station, block.start, self._length, self._settings.use_air
+            )
+            self._start = block.start
+            self._number = 0
+        self._counter.take(block)
+        self._last = block.stop
+        return self._add(estimates, small)
+
+    def finish(self, estimates: Estimates, small: SmallScales | None) -> list[WindowStatistics]:
+        """The remaining estimates and the last, shorter window; the next block starts anew."""
+        out = self._add(estimates, small)
+        if self._sums.count:
+            out += self._close(min(self._last, self._start + self._length))
+        self._counter = None
+        self._sums = _Sums()
+        return out
+
+    def _add(self, estimates: Estimates, small: SmallScales | None) -> list[WindowStatistics]:
+        out: list[WindowStatistics] = []
+        first = 0
+        time = estimates.time
+        while first < time.size:
+            end = self._start + self._length
+            stop = int(np.searchsorted(time, end))
+            if stop > first:
+                self._accumulate(estimates, slice(first, stop), small)
+            if stop < time.size:
+                out += self._close(end)
+            first = stop
+        return out
+
+    def _accumulate(self, estimates: Estimates, part: slice, small: SmallScales | None) -> None:
+        s = self._sums
+        v = estimates.velocity[part]
+        p = estimates.covariance[part]
+        h = np.hypot(v[:, 0], v[:, 1])
+        safe = np.maximum(h, 0.2)
+        east, north = v[:, 0] / safe, v[:, 1] / safe
+        across = north**2 * p[:, 0, 0] + east**2 * p[:, 1, 1] - 2 * east * north * p[:, 0, 1]
+        s.count += v.shape[0]
+        s.velocity += v.sum(axis=0)
+        s.products += np.einsum("ni,nj->ij", v, v)
+        s.covariance += p.sum(axis=0)
+        s.own_trace += float(np.trace(estimates.apparent_covariance[part], axis1=1, axis2=2).sum())
+        s.speed += float(np.sum(h + 0.5 * across / safe))
+        if small is not None:
+            s.along += small.along
+            s.across += small.across
+            s.blocks += 1
+
+    def _close(self, stop: int) -> list[WindowStatistics]:
+        """Statistics of the current window; the next one begins at `stop`."""
+        assert self._counter is not None
+        s, run, start = self._sums, self._counter.window(self._number), self._start
+        self._start = stop
+        self._number += 1
+        self._sums = _Sums()
+        if s.count == 0:
+            return []
+        return [self._statistics(s, run, start, stop)]
+
+    def _statistics(self, s: _Sums, run: RunSums, start: int, stop: int) -> WindowStatistics:
+        assert self._counter is not None
+        duration = max((stop - start) * 1e-9, 1e-9)
+        rotor, vane = self._counter.history.rotor, self._counter.history.vane
+        length = rotor.calibration_distance
+        mean = s.velocity / s.count
+        speed = s.speed / s.count
+        wind_run, raw_speed = self._raw(run, duration)
+        bias = np.append(wind_run - mean[:2], 0.0)
+        fluctuation = s.products / s.count - np.outer(mean, mean) + s.covariance / s.count
+        direction = math.atan2(mean[1], mean[0])
+        turn = np.array(
+            [
+                [math.cos(direction), math.sin(direction), 0.0],
+                [-math.sin(direction), math.cos(direction), 0.0],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+        turbulence = np.sqrt(np.maximum(np.diag(turn @ fluctuation @ turn.T), 0.0))
+        blocks = max(s.blocks, 1)
+        vector_speed = float(np.hypot(mean[0], mean[1]))
+        state = WindowTurbulence(
+            speed, vector_speed, float(fluctuation[2, 2]),
+            SmallScales(s.along / blocks, s.across / blocks),
+        )  # fmt: skip
+        arithmetic = 0.0
+        if run.intervals and run.interval_turned > 0.0:
+            mean_rate = run.interval_turned / run.interval_time
+            offset = self._counter.starting_speed / length
+            arithmetic = (run.rates / run.intervals + offset) / (mean_rate + offset) - 1.0
+        terms = predicted_terms(rotor, vane, state, arithmetic)
+        covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
+        seen = 1.0 - float(np.sum(np.square(run.directions))) / max(run.turned, 1e-9) ** 2
+        loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
+        across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
+        across_variance = float(across_direction @ covariance @ across_direction)
+        independent = max(duration / _CORRELATION_TIME / 10.0, 1.0)
+        return WindowStatistics(
+            start=start,
+            stop=stop,
+            complete=min(s.count / (duration * self._settings.output_rate), 1.0),
+            wind_run_mean=wind_run,
+            vector_mean=mean,
+            vector_mean_covariance=covariance,
+            bias=bias,
+            bias_covariance=bias_covariance,
+            raw_scalar_mean=raw_speed,
+            scalar_mean=speed,
+            scalar_mean_uncertainty=float(np.sqrt(np.trace(covariance[:2, :2]) / 2.0)),
+            direction=direction,
+            direction_uncertainty=math.sqrt(across_variance) / max(vector_speed, 0.1),
+            direction_variance=seen,
+            corrected_direction_variance=seen + loss,
+            direction_variance_uncertainty=math.hypot(
+                _CORRECTION_UNCERTAINTY * loss, seen * math.sqrt(2.0 / independent)
+            ),
+            turbulence=turbulence,
+            bias_terms=terms,
+            instrument=rotor.name,
+        )
+
+    def _raw(self, run: RunSums, duration: float) -> tuple[FloatArray, float]:
+        """Vector mean by wind run (K94 (83)) and count mean [m/s], by the calibration."""
+        assert self._counter is not None
+        length = self._counter.history.rotor.calibration_distance
+        offset = self._counter.starting_speed if run.edges else 0.0
+        readings = max(run.readings, 1)
+        vector = length * run.directions / duration
+        vector = vector + (offset * run.time_directions + run.carried) / readings
+        return vector, length * run.turned / duration + offset
+
+    def _uncertainty(
+        self, s: _Sums, speed: float, raw_speed: float, bias: FloatArray, duration: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Covariances of the corrected vector mean and of the correction [m^2/s^2].
+
+        The instruments' own errors average out over the window, those of the mount's attitude and
+        velocity, of the calibration and of the correction do not.
+        """
+        own = s.own_trace / s.count / 3.0
+        total = s.covariance / s.count
+        mount = max(float(np.trace(total)) / 3.0 - own, 0.0)
+        averaged = own * min(_CORRELATION_TIME / duration, 1.0)
+        local = abs(raw_speed - speed) if self._station.platform is None else 0.0
+        correction = _CORRECTION_UNCERTAINTY * max(float(np.hypot(bias[0], bias[1])), local)
+        bias_covariance = np.diag([correction**2, correction**2, 0.0])
+        mean_covariance = np.eye(3) * (
+            averaged + mount + (_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2
+        )
+        mean_covariance[2, 2] = total[2, 2]
+        return mean_covariance, bias_covariance
