@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -25,11 +26,13 @@ class TopicData:
         message_type: E.g. `std_msgs/msg/Header`.
         log_time: Time of recording of each message [ns].
         raw: The messages in CDR.
+        count: Messages in the bag, whether they were read or not.
     """
 
     message_type: str
     log_time: list[int] = field(default_factory=list)
     raw: list[bytes] = field(default_factory=list)
+    count: int = 0
 
 
 @dataclass
@@ -61,20 +64,21 @@ def typestore() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-def read_bag(path: Path) -> BagContent:
-    """All messages of a bag, or those that are left of a damaged one.
+def read_bag(path: Path, wanted: Callable[[str], bool] = lambda topic: True) -> BagContent:
+    """The messages of a bag, or those that are left of a damaged one.
 
     Args:
         path: Bag folder or a single .mcap or .db3 file.
+        wanted: Whether a topic's messages are to be read; the other topics stay empty.
 
     Raises:
         UserError: Nothing can be read.
     """
     try:
-        return _read(path)
+        return _read(path, wanted)
     except Exception as problem:
         # A bag can be broken in any way; what its reader raises then is not specified.
-        content = _salvaged(path, problem)
+        content = _salvaged(path, wanted, problem)
     if not any(data.raw for data in content.topics.values()):
         reason = content.notes[0] if content.notes else "it holds no messages"
         raise UserError(
@@ -85,21 +89,25 @@ def read_bag(path: Path) -> BagContent:
     return content
 
 
-def _read(path: Path) -> BagContent:
+def _read(path: Path, wanted: Callable[[str], bool]) -> BagContent:
     content = BagContent({}, get_typestore(Stores.ROS2_JAZZY))
     with Reader(path) as reader:
         appenders = {}
         for connection in reader.connections:
             data = content.topic(connection.topic, connection.msgtype, connection.msgdef)
+            data.count += connection.msgcount
             appenders[connection.id] = (data.log_time.append, data.raw.append)
-        for connection, time, raw in reader.messages():
+        chosen = [c for c in reader.connections if wanted(c.topic)]
+        if not chosen:
+            return content
+        for connection, time, raw in reader.messages(connections=chosen):
             add_time, add_raw = appenders[connection.id]
             add_time(time)
             add_raw(raw)
     return content
 
 
-def _salvaged(path: Path, problem: Exception) -> BagContent:
+def _salvaged(path: Path, wanted: Callable[[str], bool], problem: Exception) -> BagContent:
     """What is left of a bag that its reader refuses."""
     files = [path] if path.is_file() else sorted(p for s in _SUFFIXES for p in path.glob(f"*{s}"))
     content = BagContent({}, get_typestore(Stores.ROS2_JAZZY))
@@ -109,8 +117,10 @@ def _salvaged(path: Path, problem: Exception) -> BagContent:
         found = salvage(file)
         for message in sorted(found.messages, key=lambda message: message.time):
             data = content.topic(message.topic, message.message_type, message.definition)
-            data.log_time.append(message.time)
-            data.raw.append(message.raw)
+            data.count += 1
+            if wanted(message.topic):
+                data.log_time.append(message.time)
+                data.raw.append(message.raw)
         count = len(found.messages)
         faults = "; ".join(dict.fromkeys(found.faults)) or "the bag has no usable metadata.yaml"
         if count:

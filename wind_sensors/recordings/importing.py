@@ -98,7 +98,10 @@ def import_files(
             read.append(_table_samples(file, mapping, delay, faults))
         advance(file)
     sources = mapping.sources
-    merged = {id(source): _joined([part[id(source)] for part in read]) for source in sources}
+    merged = {
+        id(source): _joined([part[id(source)] for part in read], source, faults)
+        for source in sources
+    }
     if not any(len(samples.time) for samples in merged.values()):
         raise UserError(
             "nothing in the files fits the mapping.",
@@ -167,11 +170,15 @@ def in_message_units(source: Source, raw: FloatArray) -> FloatArray:
     return np.asarray(raw * factor + offset, dtype=np.float64)
 
 
-def _joined(parts: Sequence[Samples]) -> Samples:
+def _joined(parts: Sequence[Samples], source: Source, faults: Counter[str]) -> Samples:
     """The samples of all the files in order of time; of the same instant the first counts."""
     time = np.concatenate([part.time for part in parts])
     value = np.concatenate([part.value for part in parts])
     _, first = np.unique(time, return_index=True)
+    repeated = len(time) - len(first)
+    if repeated:
+        name = source.column or f"{source.sentence} field {source.value}"
+        faults[f"values of {name} at an instant that has one already"] += repeated
     return Samples(time[first], value[first])
 
 

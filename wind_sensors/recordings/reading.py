@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BaseModel
 
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
@@ -55,11 +56,24 @@ def read_recording(path: str | Path, station_file: str | Path | None = None) -> 
         UserError: There is no such recording, its bag or its station file cannot be read, or the
             bag has none of the station's topics.
     """
+    content, station = open_recording(path, station_file)
+    name = Path(path).name or Path(path).resolve().name
+    return signals_of(content, station, name, str(path))
+
+
+def open_recording(
+    path: str | Path, station_file: str | Path | None = None
+) -> tuple[BagContent, Station]:
+    """The messages of a recording's station topics, and the station.
+
+    Raises:
+        UserError: As in `read_recording`.
+    """
     folder = Path(path)
     if not folder.exists():
         raise UserError("there is no such recording.", str(path), "Check the path.")
     own_file = folder / STATION_FILE
-    bag = folder / BAG_FOLDER if (folder / BAG_FOLDER).exists() else folder
+    bag = bag_of(folder)
     if station_file is None and not own_file.exists():
         raise UserError(
             f"there is no {STATION_FILE} beside the bag.",
@@ -67,8 +81,54 @@ def read_recording(path: str | Path, station_file: str | Path | None = None) -> 
             "Name the station file with --station FILE.",
         )
     station = load_station(own_file if station_file is None else station_file)
-    name = folder.name or folder.resolve().name
-    return signals_of(read_bag(bag), station, name, str(path))
+    topics = station_topics(station)
+    content = read_bag(bag, lambda topic: topic in topics or topic.endswith(TRUTH_TOPIC))
+    return content, station
+
+
+def bag_of(folder: Path) -> Path:
+    """The bag of a recording folder, or the path itself."""
+    return folder / BAG_FOLDER if (folder / BAG_FOLDER).exists() else folder
+
+
+def read_series(path: str | Path, topic: str, field_name: str = "data") -> Series:
+    """Any number in a recording's bag, e.g. the deviation of a mean that was imported.
+
+    Args:
+        path: Recording folder or bag.
+        topic: Topic.
+        field_name: Numeric field.
+
+    Raises:
+        UserError: The bag has no such topic or field.
+    """
+    content = read_bag(bag_of(Path(path)), lambda name: name == topic)
+    data = content.topics.get(topic)
+    if data is None:
+        known = ", ".join(sorted(content.topics))
+        raise UserError(f"there is no topic {topic}.", str(path), f"Topics: {known}.")
+    source = Input(topic=topic, type=data.message_type, field=field_name)
+    found = _SignalReader(content, str(path)).series(source, "temperature")
+    nothing = Series(np.empty(0, dtype=np.int64), np.empty(0))
+    return nothing if found is None else found
+
+
+def station_topics(station: Station) -> set[str]:
+    """Every topic that the station's inputs name."""
+    found: set[str] = set()
+
+    def visit(node: object) -> None:
+        if isinstance(node, Input):
+            found.add(node.topic)
+        elif isinstance(node, BaseModel):
+            for name in type(node).model_fields:
+                visit(getattr(node, name))
+        elif isinstance(node, tuple):
+            for item in node:
+                visit(item)
+
+    visit(station)
+    return found
 
 
 def signals_of(content: BagContent, station: Station, name: str, where: str) -> Recording:

@@ -33,6 +33,7 @@ class Input(Entry):
     """
 
     topic: str
+    """Name of the topic."""
     type: str = ""
     """ROS message type, e.g. `std_msgs/msg/Header`; empty: the default of the signal."""
     field: str = ""
@@ -71,9 +72,13 @@ class FlowDistortion(Entry):
     """
 
     cosine_1: float = 0.0
+    """c1"""
     sine_1: float = 0.0
+    """s1"""
     cosine_2: float = 0.0
+    """c2"""
     sine_2: float = 0.0
+    """s2"""
 
 
 class Electronics(Entry):
@@ -106,18 +111,24 @@ class Outage(Entry):
     start: float
     """Seconds since the start of the recording."""
     stop: float
+    """Seconds since the start of the recording."""
 
 
 class Instrument(Entry):
     """What every instrument has."""
 
     name: str
+    """Name within the station."""
     profile: str = ""
     """Name of the shipped profile whose constants were used as defaults."""
     clock: Clock = Clock()
+    """Its stamps against the truth."""
     outages: tuple[Outage, ...] = ()
+    """Intervals without new readings."""
     wake_shadows: tuple[WakeShadow, ...] = ()
+    """Wakes of obstacles in which it stands."""
     flow_distortion: FlowDistortion = FlowDistortion()
+    """What its mount does to the wind."""
     tilt_deg: tuple[float, float] = (0.0, 0.0)
     """Lean of the axis towards the sensor's x and y, against the platform's up."""
     position: Vector3 = (0.0, 0.0, 0.0)
@@ -128,18 +139,23 @@ class Rotor(Instrument):
     """What cups and propellers share."""
 
     pulses: Input
+    """Topic of the edges, counts, angles or frequencies."""
     pulses_per_revolution: int = Field(ge=1)
+    """Edges in one turn."""
     calibration_distance: Positive
     """Wind run per radian l [m/rad]."""
     distance_constant: Positive
     """l0 [m], at the calibration's air density."""
     arm_radius: Positive | None = None
+    """Distance of the cups' or blades' middle from the axis [m]."""
     a4: float = Field(default=1.0, gt=-1.0, lt=3.0)
     """Share of the torque's slope that follows the wind; 1 follows Kristensen et al. (2014)."""
     reference_density: Positive = 1.225
     """Air density of the calibration [kg/m^3]."""
     calibration_gain: Positive = 1.0
+    """Steady rate relative to the calibration's."""
     calibration_offset: float = 0.0
+    """Added to the steady reading [m/s]."""
     friction_speed: NonNegative = 0.0
     """U_s [m/s]: friction beyond the calibration's, as the speed whose torque it balances."""
     friction_temperature_coefficient: float = 0.0
@@ -147,25 +163,33 @@ class Rotor(Instrument):
     reference_temperature: float = 15.0
     """[deg C]"""
     inertia_factor: Positive = 1.0
+    """Moment of inertia relative to the healthy rotor's."""
     torque_harmonic: NonNegative = 0.0
+    """Amplitude of a once-per-turn torque, relative to the dynamic pressure's."""
     torque_harmonic_phase_deg: float = 0.0
+    """Rotor angle of the strong side."""
     electronics: Electronics = Electronics()
+    """From the shaft to the stamp."""
 
 
 class Cup(Rotor):
     """A cup anemometer, axis up."""
 
     kind: Literal["cup"] = "cup"
+    """The kind of the instrument."""
     starting_speed: float = Field(default=0.0, ge=0.0, lt=5.0)
     """Calibration offset U0 [m/s]: l S = U - U0."""
     mu1: float = Field(default=0.0, gt=-2.0, lt=2.0)
+    """Response to the vertical wind, first order, Kristensen (1994), (2)."""
     mu2: float = Field(default=0.0, gt=-3.0, lt=3.0)
+    """Response to the vertical wind, second order: 0 cosine, 1 flat."""
 
 
 class Propeller(Rotor):
     """A propeller, on a vane or on a fixed axis."""
 
     kind: Literal["propeller"] = "propeller"
+    """The kind of the instrument."""
     mounted_on: str = ""
     """Name of the vane that carries it; empty: fixed along `axis`."""
     distance_to_vane_axis: float = 0.0
@@ -175,6 +199,7 @@ class Propeller(Rotor):
     stall_speed: NonNegative = 0.0
     """U_s [m/s] of the healthy propeller: P omega = U - U_s^2/U."""
     angular_response_deg: tuple[float, ...] = ()
+    """Angles of the values in `angular_response`, increasing from 0."""
     angular_response: tuple[float, ...] = ()
     """f(theta) at `angular_response_deg`; empty: cosine."""
     mu2: float | None = None
@@ -201,9 +226,13 @@ class Angle(Instrument):
     distance_constant: Positive
     """l_v [m], at the reference density."""
     damping_ratio: Positive
+    """zeta, 1 at critical damping."""
     reference_density: Positive = 1.225
+    """Air density of `distance_constant` [kg/m^3]."""
     inertia_factor: Positive = 1.0
+    """Moment of inertia relative to the healthy vane's."""
     damping_factor: NonNegative = 1.0
+    """Damping relative to the healthy vane's."""
     friction_speed: NonNegative = 0.0
     """h_f [m/s]: the vane sticks while h^2 |sin(deviation)| < h_f^2."""
     imbalance: float = 0.0
@@ -217,7 +246,9 @@ class Angle(Instrument):
     eccentricity_phase_deg: float = 0.0
     """Heading at which the eccentricity error passes zero upwards."""
     quantisation_deg: NonNegative = 0.0
+    """Step of the encoder."""
     gap_centre_deg: float = 0.0
+    """Middle of the dead gap."""
     gap_width_deg: float = Field(default=0.0, ge=0.0, lt=360.0)
     """Dead gap of a potentiometer; inside it the reading is `gap_reading_deg`."""
     gap_reading_deg: float | None = None
@@ -225,21 +256,27 @@ class Angle(Instrument):
     filter_time_constant: NonNegative = 0.0
     """First-order low-pass on the angle [s]."""
     noise_deg: NonNegative = 0.0
+    """Standard deviation of one reading's noise."""
 
 
 class Vane(Angle):
     """A wind vane, axis up."""
 
     kind: Literal["vane"] = "vane"
+    """The kind of the instrument."""
     joint_states: Input
+    """Topic of the nose's heading, counter-clockwise from the sensor's x axis."""
 
 
 class Bivane(Angle):
     """A vane that follows azimuth and elevation."""
 
     kind: Literal["bivane"] = "bivane"
+    """The kind of the instrument."""
     azimuth: Input
+    """Topic of the nose's heading, counter-clockwise from the sensor's x axis."""
     elevation: Input
+    """Topic of the tail's lift, positive when the wind blows upwards."""
     speed: str = ""
     """Name of the instrument whose speed sets the bivane's response."""
 
@@ -251,7 +288,9 @@ class Reference(Entry):
     """An independent wind in the recording, and how far it can be trusted."""
 
     kind: Literal["sonic", "tunnel", "truth"] = "sonic"
+    """What measured it; `truth` comes from a simulator."""
     topic: Input
+    """Topic of the wind velocity, east, north, up."""
     separation: NonNegative = 0.0
     """Distance from the station's sensors [m]."""
     path_length: NonNegative = 0.0
@@ -264,15 +303,20 @@ class Air(Entry):
     """Topics of the air's state."""
 
     temperature: Input | None = None
+    """Topic of the air temperature [deg C]."""
     pressure: Input | None = None
+    """Topic of the air pressure [Pa]."""
 
 
 class HeadingDeviation(Entry):
     """Compass error added to the true heading: A + B sin(heading) + C cos(heading)."""
 
     constant_deg: float = 0.0
+    """A"""
     sine_deg: float = 0.0
+    """B"""
     cosine_deg: float = 0.0
+    """C"""
 
 
 class Downwash(Entry):
@@ -288,8 +332,11 @@ class Platform(Entry):
     """The moving carrier of the station."""
 
     odometry: Input | None = None
+    """Topic of attitude, velocity and position (nav_msgs/Odometry)."""
     imu: Input | None = None
+    """Topic of attitude and angular rate (sensor_msgs/Imu), instead of odometry."""
     twist: Input | None = None
+    """Topic of the velocity (geometry_msgs/TwistStamped), with `imu`."""
     sensor_position: Vector3 = (0.0, 0.0, 0.0)
     """Sensor in the platform's frame (x forward, y left, z up) [m]."""
     sensor_rotation_deg: Vector3 = (0.0, 0.0, 0.0)
@@ -303,12 +350,19 @@ class Platform(Entry):
     velocity_share: float = 1.0
     """Share of the platform's velocity that reaches the sensor's signals (0: already removed)."""
     heading_deviation: HeadingDeviation = HeadingDeviation()
+    """Error of the compass."""
     downwash: Downwash = Downwash()
+    """Rotor inflow at the sensor."""
     clock: Clock = Clock()
+    """Its stamps against the truth."""
     heading_reference: Literal["true", "magnetic"] = "true"
+    """What the reported heading counts from."""
     magnetic_declination_deg: float = 0.0
+    """Magnetic north minus true north, positive to the east."""
     attitude_noise_deg: NonNegative = 0.5
+    """Standard deviation of the reported attitude."""
     velocity_noise: NonNegative = 0.05
+    """Standard deviation of the reported velocity [m/s]."""
 
 
 class Change(Entry):
@@ -330,23 +384,32 @@ class RecordingInfo(Entry):
     start: str = "1970-01-01T00:00:00Z"
     """First moment of the recording, UTC."""
     frame: str = "enu"
+    """Name of the earth-fixed frame of the wind vectors (ENU)."""
     averaging_time: NonNegative = 0.0
     """Every message is a mean over this time [s] and stamped at its end; 0: samples."""
     measuring_height: Positive = 10.0
+    """Of the sensors above ground [m]."""
     roughness_length: Positive = 0.03
+    """Of the ground upwind [m]."""
 
 
 class Station(Entry):
     """The whole station file."""
 
     recording: RecordingInfo = RecordingInfo()
+    """When and where."""
     instruments: tuple[AnyInstrument, ...] = Field(min_length=1)
+    """Cups, propellers, vanes, bivanes."""
     reference: Reference | None = None
+    """An independent wind, if the recording has one."""
     air: Air = Air()
+    """Topics of the air's state."""
     platform: Platform | None = None
+    """The moving carrier; none on a mast."""
     sensor_heading_deg: float = 0.0
     """Heading of the sensor's x axis on a mast, counter-clockwise from east."""
     changes: tuple[Change, ...] = ()
+    """What is different for a while or from one moment on."""
 
     @model_validator(mode="after")
     def _names_fit_together(self) -> Station:

@@ -1,0 +1,156 @@
+"""`wind info`: what is in a recording or a station file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.bag import BagContent, TopicData
+from wind_sensors.recordings.reading import open_recording, signals_of
+from wind_sensors.recordings.station_files import load_station, shipped_profiles
+from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station, Vane
+from wind_sensors.station.reference import schema_markdown
+from wind_sensors.station.signals import Recording, TimeArray
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "info",
+        help="what is in a recording or a station file",
+        description="Show what is in a RECORDING (topics, rates, gaps, what reading it had to "
+        "say, the station) or in a station file.",
+    )
+    parser.add_argument("path", metavar="RECORDING", nargs="?", help="recording or station file")
+    parser.add_argument("--station", metavar="FILE", help="station file of a bag")
+    parser.add_argument("--profiles", action="store_true", help="list the instrument profiles")
+    parser.add_argument(
+        "--schema", action="store_true", help="write the reference of the station file (Markdown)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print what is there; 0 on success."""
+    console = Console(soft_wrap=False)
+    if options.schema:
+        print(schema_markdown(), end="")
+        return 0
+    if options.profiles:
+        _print_profiles(console)
+        return 0
+    if options.path is None:
+        raise UserError(
+            "no recording is named.", "", "Give a recording, a station file, or --profiles."
+        )
+    path = Path(options.path)
+    if path.suffix in {".yaml", ".yml"} or not path.exists():
+        _print_station(console, load_station(path))
+        return 0
+    content, station = open_recording(path, options.station)
+    recording = signals_of(content, station, path.resolve().name, str(path))
+    seconds = (recording.stop - recording.start) * 1e-9
+    start = np.datetime_as_string(np.datetime64(recording.start, "ns"), unit="ms")
+    console.print(f"[bold]{recording.name}[/bold]  {start}Z, {duration(seconds)}")
+    _print_topics(console, content, recording)
+    _print_station(console, station)
+    for note in recording.notes:
+        console.print(f"[yellow]note[/yellow] {note}", highlight=False)
+    if not recording.notes:
+        console.print("nothing unusual in the signals", highlight=False)
+    return 0
+
+
+def duration(seconds: float) -> str:
+    """A span for people: `15 min 0 s`."""
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    days, hours = divmod(hours, 24)
+    if days:
+        return f"{days} d {hours} h"
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+
+
+def _print_topics(console: Console, content: BagContent, recording: Recording) -> None:
+    stamps = _stamps(recording)
+    table = Table(box=None, pad_edge=False, title="topics", title_justify="left")
+    table.add_column("topic", overflow="fold")
+    table.add_column("type", no_wrap=True)
+    for name in ("messages", "rate", "longest gap"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for topic, data in sorted(content.topics.items()):
+        rate, gap = _rate_and_gap(stamps.get(topic, _logged(data)))
+        table.add_row(topic, data.message_type.replace("/msg/", "/"), f"{data.count}", rate, gap)
+    console.print(table)
+
+
+def _stamps(recording: Recording) -> dict[str, TimeArray]:
+    """Stamps of the station's signals by topic."""
+    found: dict[str, TimeArray] = {}
+    for instrument in recording.station.instruments:
+        if isinstance(instrument, (Cup, Propeller)) and instrument.name in recording.pulses:
+            found[instrument.pulses.topic] = recording.pulses[instrument.name].time
+        elif isinstance(instrument, Vane) and instrument.name in recording.angles:
+            found[instrument.joint_states.topic] = recording.angles[instrument.name].time
+    return found
+
+
+def _logged(data: TopicData) -> TimeArray:
+    return np.asarray(data.log_time, dtype=np.int64)
+
+
+def _rate_and_gap(time: TimeArray) -> tuple[str, str]:
+    if len(time) < 2:
+        return "", ""
+    ordered = np.sort(time)
+    span = (int(ordered[-1]) - int(ordered[0])) * 1e-9
+    gap = float(np.diff(ordered).max()) * 1e-9
+    return f"{(len(time) - 1) / span:.4g} Hz" if span > 0.0 else "", f"{gap:.3g} s"
+
+
+def _print_station(console: Console, station: Station) -> None:
+    table = Table(box=None, pad_edge=False, title="station", title_justify="left")
+    for name in ("instrument", "kind", "constants"):
+        table.add_column(name, overflow="fold")
+    for instrument in station.instruments:
+        profile = f" ({instrument.profile})" if instrument.profile else ""
+        table.add_row(instrument.name, instrument.kind + profile, _constants(instrument))
+    if station.reference is not None:
+        reference = station.reference
+        text = f"{reference.separation:g} m away, path {reference.path_length:g} m"
+        table.add_row("reference", reference.kind, text)
+    if station.platform is not None:
+        position = ", ".join(f"{x:g}" for x in station.platform.sensor_position)
+        table.add_row("platform", "moving", f"sensor at ({position}) m")
+    console.print(table)
+    for change in station.changes:
+        stop = "the end" if change.stop is None else f"{change.stop:g} s"
+        keys = ", ".join(f"{key} = {value}" for key, value in change.set.items())
+        console.print(f"from {change.start:g} s to {stop}: {change.instrument} {keys}")
+
+
+def _constants(instrument: Cup | Propeller | Vane | Bivane) -> str:
+    if isinstance(instrument, Angle):
+        text = f"distance constant {instrument.distance_constant:g} m, "
+        return text + f"damping ratio {instrument.damping_ratio:g}"
+    text = f"{instrument.calibration_distance:g} m/rad, {instrument.pulses_per_revolution} pulses"
+    text += f" a turn, distance constant {instrument.distance_constant:g} m"
+    if isinstance(instrument, Propeller) and instrument.mounted_on:
+        text += f", on '{instrument.mounted_on}'"
+    return text
+
+
+def _print_profiles(console: Console) -> None:
+    table = Table(box=None, pad_edge=False)
+    for name in ("profile", "kind", "what", "source"):
+        table.add_column(name, overflow="fold")
+    for profile in shipped_profiles().values():
+        table.add_row(profile.name, profile.kind, profile.description, profile.source)
+    console.print(table)
