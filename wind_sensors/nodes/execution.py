@@ -55,6 +55,19 @@ class _StopSignals:
                 signal.signal(number, self._answer)
             self._installed = True
 
+    def uninstall(self, *, ignore: bool) -> None:
+        """Hand SIGINT and SIGTERM back to Python's defaults, or to nobody.
+
+        Args:
+            ignore: The process is about to end, so that a signal must not spoil its exit status
+                while the interpreter closes down.
+        """
+        interrupt = signal.SIG_IGN if ignore else signal.default_int_handler
+        signal.signal(signal.SIGINT, interrupt)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN if ignore else signal.SIG_DFL)
+        self._installed = False
+        self.phase = _Phase.LOADING
+
     def _answer(self, number: int, frame: FrameType | None) -> None:
         if self.phase is _Phase.LOADING:
             # Nothing has been opened yet, so there is nothing to close.
@@ -94,6 +107,7 @@ def run(
     arguments: Sequence[str] | None = None,
     *,
     until: Callable[[], bool] | None = None,
+    last: bool = True,
 ) -> int:
     """Initialise rclpy, build nodes, spin them in one executor, and clean up.
 
@@ -104,6 +118,7 @@ def run(
         build: Makes the nodes; called after `rclpy.init`.
         arguments: Command line that may hold `--ros-args`.
         until: Asked after each batch of callbacks, at least twice a second; True ends the run.
+        last: The process ends after this, so further stop signals are ignored.
 
     Returns:
         Exit status 0.
@@ -149,6 +164,7 @@ def run(
         for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()
+        _stop_signals.uninstall(ignore=last)
     return 0
 
 

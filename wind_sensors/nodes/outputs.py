@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 _SECOND = 1_000_000_000
 
+BIAS_TERMS = ("u", "v", "w", "vane_lag", "translation", "arithmetic_mean")
+"""Relative biases of the raw mean speed that have a topic of their own."""
+
 TOPICS: dict[str, str] = {
     "wind": "TwistWithCovarianceStamped: corrected wind velocity, where the air goes, ENU",
     "wind/apparent": "TwistWithCovarianceStamped: wind minus sensor velocity, sensor frame",
@@ -74,7 +77,7 @@ class WindPublishers:
         self._direction = self._advertise(Float64, "wind/direction_from")
         self._variance = self._advertise(Float64, "wind/direction_variance")
         self._bias = self._advertise(twist, "wind/bias")
-        self._terms: dict[str, Publisher] = {}
+        self._terms = {name: self._advertise(Float64, f"wind/bias/{name}") for name in BIAS_TERMS}
         self._nmea: Publisher | None = None
         self._last_sentence: int | None = None
 
@@ -108,9 +111,8 @@ class WindPublishers:
         self._direction.publish(Float64(data=float(direction_from_deg(window.vector_mean))))
         self._variance.publish(Float64(data=float(window.corrected_direction_variance)))
         for name, term in window.bias_terms.items():
-            if name not in self._terms:
-                self._terms[name] = self._advertise(Float64, f"wind/bias/{name}")
-            self._terms[name].publish(Float64(data=float(term.value)))
+            if name in self._terms:
+                self._terms[name].publish(Float64(data=float(term.value)))
 
     def _publish_sentences(self, estimate: WindEstimate) -> None:
         last = self._last_sentence

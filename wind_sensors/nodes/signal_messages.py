@@ -11,6 +11,7 @@ from geometry_msgs.msg import TwistStamped, Vector3Stamped
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import message_class
 from wind_sensors.nodes.outputs import stamp
+from wind_sensors.nodes.topics import TRUTH_TOPIC
 from wind_sensors.simulation.transport import Event
 from wind_sensors.station.inputs import (
     FieldPath,
@@ -24,7 +25,6 @@ from wind_sensors.station.inputs import (
 )
 from wind_sensors.station.model import Cup, Input, Platform, Propeller, Station
 
-TRUTH_TOPIC = "truth/wind"
 BODY_FRAME = "base_link"
 
 _BATCH = 1_000_000_000

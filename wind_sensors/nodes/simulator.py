@@ -19,13 +19,14 @@ from wind_sensors.nodes.outputs import stamp
 from wind_sensors.nodes.parameters import Parameter, Value, declare, describe
 from wind_sensors.nodes.quality import advertise, output_quality
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
-from wind_sensors.nodes.signal_messages import TRUTH_TOPIC, SignalEncoder
+from wind_sensors.nodes.signal_messages import SignalEncoder
 from wind_sensors.nodes.station_parameters import (
     STATION,
     base_document,
     station_table,
     station_with,
 )
+from wind_sensors.nodes.topics import TRUTH_TOPIC, instrument_topics
 from wind_sensors.simulation.run import SignalStream, recording_start
 from wind_sensors.simulation.transport import Event, live_events
 
@@ -67,7 +68,7 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         "wait_for_subscribers",
         int,
         0,
-        "Begin when each raw topic has so many subscribers.",
+        "Begin when the topic of each instrument has so many subscribers.",
         minimum=0,
         maximum=100,
     ),
@@ -89,7 +90,8 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
 
 _TICK = 0.002
 _CLOCK_WALL_PERIOD = 10_000_000
-_SECOND = 1_000_000_000
+_SETTLING = 0.3
+"""Wall time between the last awaited subscriber and the first signal [s]."""
 
 
 class SimulatorNode(Node):
@@ -141,6 +143,8 @@ class SimulatorNode(Node):
         self._events: Iterator[Event] = live_events(SignalStream(self.station, self._scenario))
         self._next_event = next(self._events)
         self._started: float | None = None
+        self._ready_at = 0.0
+        self._instrument_topics = instrument_topics(self.station)
         self._late = 0.0
         self._timer = self.create_timer(
             _TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
@@ -176,10 +180,18 @@ class SimulatorNode(Node):
 
     def _has_started(self) -> bool:
         if self._started is None:
-            outlets = self._outlets.values()
-            if all(o.get_subscription_count() >= self._waits_for for o in outlets):
+            if self._lonely_topics():
+                self._ready_at = time.monotonic() + (_SETTLING if self._waits_for else 0.0)
+            elif time.monotonic() >= self._ready_at:
                 self._start()
         return self._started is not None
+
+    def _lonely_topics(self) -> list[str]:
+        return sorted(
+            topic
+            for topic in self._instrument_topics
+            if self._outlets[topic].get_subscription_count() < self._waits_for
+        )
 
     def _start(self) -> None:
         self._begin = recording_start(self.station) if self._with_clock else time.time_ns()
@@ -201,12 +213,7 @@ class SimulatorNode(Node):
             "time spent in the last burst": f"{self._late * 1e3:.1f} ms",
         }
         if self._started is None:
-            missing = [
-                topic
-                for topic, outlet in self._outlets.items()
-                if outlet.get_subscription_count() < self._waits_for
-            ]
-            text = f"Waiting for subscribers of {', '.join(sorted(missing))}."
+            text = f"Waiting for subscribers of {', '.join(self._lonely_topics())}."
             yield Status("simulation", Level.WARN, text, details)
         elif self.finished:
             yield Status("simulation", Level.OK, "The simulation has ended.", details)

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from wind_sensors.nodes.outputs import TOPICS
-from wind_sensors.nodes.signal_messages import TRUTH_TOPIC
+from wind_sensors.nodes.outputs import BIAS_TERMS, TOPICS
 from wind_sensors.station.inputs import angle_inputs
 from wind_sensors.station.model import Cup, Input, Propeller, Station
 
-BIAS_TERMS = ("u", "v", "w", "vane_lag", "translation", "arithmetic_mean")
+TRUTH_TOPIC = "truth/wind"
+"""Where a simulator says what the wind was."""
 
 
-def raw_topics(station: Station) -> list[str]:
-    """Topics of the instruments, the reference, the air and the platform, without repetition."""
-    sources: list[Input | None] = []
+def instrument_topics(station: Station) -> list[str]:
+    """Topics of the instruments, without repetition."""
+    sources: list[Input] = []
     for instrument in station.instruments:
         if isinstance(instrument, (Cup, Propeller)):
             sources.append(instrument.pulses)
         else:
             sources += angle_inputs(instrument).values()
-    sources.append(station.reference.topic if station.reference else None)
+    return list(dict.fromkeys(source.topic for source in sources))
+
+
+def raw_topics(station: Station) -> list[str]:
+    """Topics of the instruments, the reference, the air and the platform, without repetition."""
+    sources: list[Input | None] = [station.reference.topic if station.reference else None]
     sources += [station.air.temperature, station.air.pressure]
     platform = station.platform
     if platform is not None:
         sources += [platform.odometry, platform.imu, platform.twist]
-    return list(dict.fromkeys(source.topic for source in sources if source is not None))
+    others = [source.topic for source in sources if source is not None]
+    return list(dict.fromkeys([*instrument_topics(station), *others]))
 
 
 def station_topics(station: Station) -> list[str]:
