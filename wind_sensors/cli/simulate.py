@@ -22,22 +22,21 @@ from wind_sensors.station.model import Station
 from wind_sensors.station.signals import PlatformStates, Recording, Winds
 from wind_sensors.turbulence.synthesis import TurbulenceSpec, isotropic_spec, surface_layer_spec
 
-_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+_UNITS = {"ms": 1e-3, "min": 60.0, "h": 3600.0, "s": 1.0}
 
 
 def seconds(text: str) -> float:
-    """A duration like `90`, `90s`, `15min`, `1h` in seconds."""
-    for unit in ("min", "h", "s"):
+    """A duration like `90`, `90s`, `50ms`, `15min`, `1h` in seconds."""
+    number, factor = text, 1.0
+    for unit, length in _UNITS.items():
         if text.endswith(unit):
-            number, factor = text[: -len(unit)], _UNITS[unit]
+            number, factor = text[: -len(unit)], length
             break
-    else:
-        number, factor = text, 1.0
     try:
         value = float(number) * factor
     except ValueError as problem:
         raise argparse.ArgumentTypeError(
-            f"'{text}' is not a duration: write it like 90s, 15min or 1h"
+            f"'{text}' is not a duration: write it like 50ms, 90s, 15min or 1h"
         ) from problem
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"a duration must be positive, not '{text}'")
@@ -143,7 +142,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     faults = parser.add_argument_group("faults of the transport")
     faults.add_argument("--loss", type=share, default=0.0, help="share of messages lost")
     faults.add_argument("--doubling", type=share, default=0.0, help="share that comes twice")
-    faults.add_argument("--jitter", type=seconds, default=None, help="largest random delay")
+    faults.add_argument(
+        "--jitter", type=seconds, default=None, help="largest random delay, like 50ms"
+    )
     faults.add_argument("--nan", type=share, default=0.0, help="share of angles that are NaN")
     faults.add_argument(
         "--clock-jump", type=float, nargs=2, metavar=("AT", "BY"),

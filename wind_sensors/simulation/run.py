@@ -41,6 +41,9 @@ FloatArray = npt.NDArray[np.float64]
 
 BLOCK_SECONDS = 10.0
 """Length of the blocks in which everything is computed [s]."""
+FINER_RECORD = 4.0
+"""How much finer than the grid the turbulence is that a moving carrier passes through: one that
+goes with the wind passes slowly and must still meet gusts of every size that its grid can carry."""
 
 
 def recording_start(station: Station) -> int:
@@ -301,7 +304,8 @@ def _source(station: Station, scenario: Scenario) -> WindSource:
             )
         return wind
     try:
-        return TurbulentWind(scenario.wind, scenario.sample_rate, station.reference)
+        finer = 1.0 if station.platform is None else FINER_RECORD
+        return TurbulentWind(scenario.wind, finer * scenario.sample_rate, station.reference)
     except ValueError as problem:
         raise UserError(
             f"The wind cannot be made: {problem}.", "wind", "Change its parameters."

@@ -93,7 +93,8 @@ class Transport:
         return random_numbers.uniform(self._faults.seed, f"transport/{source}/{fault}", numbers)
 
     def _sent_from(self, source: str, stamps: TimeArray, values: FloatArray) -> list[Event]:
-        faults = self._faults
+        # The truth is nobody's message: it stays whole, so that results can be judged by it.
+        faults = self._faults if source != "truth" else TransportFaults(delay=self._faults.delay)
         first = self._sent.get(source, 0)
         numbers = first + np.arange(stamps.size, dtype=np.int64)
         self._sent[source] = first + int(stamps.size)

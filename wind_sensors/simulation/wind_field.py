@@ -23,9 +23,8 @@ FloatArray = npt.NDArray[np.float64]
 
 DECAY_OF_COHERENCE = 7.0
 """Exponent c of the root coherence exp(-c r k / 2 pi) at a separation r (Davenport's form)."""
-_TAPS = 129
-_LEAD = 256
-"""Samples of the record before t = 0, so that filters and interpolation find a past."""
+_FILTER_SECONDS = 6.4
+"""Length of the filters that make the reference's wind [s]."""
 _SECOND_FIELD = 1_000_003
 """Added to the seed for the part of the reference's wind that the sensor does not see."""
 
@@ -60,13 +59,14 @@ def coherence_filters(
         Taps for the sensor's record (root coherence times path average) and for the independent
         record (what is missing of the variance); shape (taps,) each.
     """
-    frequency = np.fft.rfftfreq(_TAPS, 1.0 / sample_rate)
+    half = round(0.5 * _FILTER_SECONDS * sample_rate)
+    taps = 2 * half + 1
+    frequency = np.fft.rfftfreq(taps, 1.0 / sample_rate)
     coherent = np.exp(-DECAY_OF_COHERENCE * separation * frequency / mean_speed)
     own = np.sqrt(1.0 - np.square(coherent))
     path = np.sinc(frequency * path_length / mean_speed)
-    half = _TAPS // 2
-    shared = np.roll(np.fft.irfft(coherent * path, _TAPS), half)
-    independent = np.roll(np.fft.irfft(own * path, _TAPS), half)
+    shared = np.roll(np.fft.irfft(coherent * path, taps), half)
+    independent = np.roll(np.fft.irfft(own * path, taps), half)
     return shared, independent
 
 
@@ -84,6 +84,9 @@ class TurbulentWind:
     ) -> None:
         self._spec = spec
         self._rate = sample_rate
+        # Filters reach into the record on both sides: t = 0 lies that far from its start.
+        self._half = round(0.5 * _FILTER_SECONDS * sample_rate)
+        self._lead = self._half + 8
         self._sensor = TurbulenceStream(spec, sample_rate)
         self._filters: tuple[FloatArray, FloatArray] | None = None
         if reference is not None and (reference.separation > 0.0 or reference.path_length > 0.0):
@@ -101,10 +104,10 @@ class TurbulentWind:
 
     def along(self, time: FloatArray, travelled: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See `WindSource.along`."""
-        place = travelled * self._rate + _LEAD
+        place = travelled * self._rate + self._lead
         nearest = np.rint(place)
         place = np.where(np.abs(place - nearest) < 1e-6, nearest, place)
-        half = _TAPS // 2
+        half = self._half
         first = int(np.floor(place[0])) - 1
         count = int(np.floor(place.max())) + 3 - first
         wide = self._sensor.fluctuations(first - half, count + 2 * half)
