@@ -8,13 +8,14 @@ whitened differences, measured minus simulated, in which a healthy station gives
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.effects.definition import PLATFORM
 from wind_sensors.diagnosis.observation import (
     HARMONICS,
     LOWEST_BAND_FREQUENCY,
@@ -33,7 +34,7 @@ from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.pulses import edge_times
 from wind_sensors.simulation.response import Response, respond
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
-from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.model import Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording
 
 FloatArray = npt.NDArray[np.float64]
@@ -118,43 +119,73 @@ class Comparison:
     speed: FloatArray
     wind_from: FloatArray
     measured: Simulated
-    _cache: dict[str, Simulated] = field(default_factory=dict, repr=False)
 
     @property
     def coefficients(self) -> int:
         """Number of cosine coefficients compared in each channel."""
         return min(self.grid.n, int(2.0 * self.grid.n * self.grid.dt * HIGHEST_FREQUENCY))
 
-    def respond(self, station: Station) -> Response:
+    def respond(self, station: Station, only: Collection[str] = ()) -> Response:
         """The station's instruments in this recording's wind."""
-        return respond(station, self.drive)
+        return respond(station, self.drive, only=only)
 
-    def signals(self, station: Station) -> tuple[dict[str, Pulses], dict[str, Angles]]:
+    def affected(self, station: Station, instrument: str) -> tuple[str, ...]:
+        """Instruments whose signals depend on a change of one entry of the station."""
+        if instrument == PLATFORM:
+            return tuple(c.instrument for c in self.channels)
+        carried = tuple(
+            i.name
+            for i in station.instruments
+            if isinstance(i, Propeller) and i.mounted_on == instrument
+        )
+        return (instrument, *carried)
+
+    def signals(
+        self, station: Station, only: Collection[str] = ()
+    ) -> tuple[dict[str, Pulses], dict[str, Angles]]:
         """Simulated pulses and readings; readings carry the stamps of the recorded ones."""
-        response = self.respond(station)
-        pulses = {
-            c.instrument: Pulses(edge_times(response, c.instrument))
-            for c in self.channels
-            if c.kind == "rotor_rate"
-        }
+        response = self.respond(station, only)
+        pulses = {}
         angles = {}
         for c in self.channels:
-            if c.kind == "vane_angle":
-                time = self.recording.angles[c.instrument].time
-                angles[c.instrument] = Angles(time, angle_readings(response, c.instrument, time))
+            name = c.instrument
+            if only and name not in only:
+                continue
+            if c.kind == "rotor_rate":
+                pulses[name] = Pulses(edge_times(response, name))
+            else:
+                time = self.recording.angles[name].time
+                angles[name] = Angles(time, angle_readings(response, name, time))
         return pulses, angles
 
-    def simulate(self, station: Station) -> Simulated:
-        """Series and statistics of a station in this recording's wind."""
-        pulses, angles = self.signals(station)
-        return self.observe(pulses, angles)
+    def simulate(
+        self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
+    ) -> Simulated:
+        """Series and statistics of a station in this recording's wind.
+
+        Args:
+            station: The station.
+            only: Instruments to simulate; empty: all.
+            rest: Simulation to take the other instruments from.
+        """
+        pulses, angles = self.signals(station, only)
+        seen = self.observe(pulses, angles)
+        if rest is None:
+            return seen
+        return Simulated(
+            {**rest.cosine, **seen.cosine},
+            {**rest.series, **seen.series},
+            {**rest.statistics, **seen.statistics},
+        )
 
     def observe(self, pulses: Mapping[str, Pulses], angles: Mapping[str, Angles]) -> Simulated:
-        """Series and statistics of pulses and readings."""
+        """Series and statistics of pulses and readings; of those channels that have any."""
         cosine: dict[str, FloatArray] = {}
         series: dict[str, FloatArray] = {}
         statistics: dict[str, FloatArray] = {}
         for channel in self.channels:
+            if channel.instrument not in (pulses if channel.kind == "rotor_rate" else angles):
+                continue
             if channel.kind == "rotor_rate":
                 rotor = self.station.instrument(channel.instrument)
                 assert isinstance(rotor, Rotor)
@@ -202,6 +233,19 @@ class Comparison:
             if high > 1.1 * low and np.count_nonzero(inside) >= 20:
                 out[k] = np.log(np.mean(power[inside]) + 1e-12)
         return out
+
+    def coherence(self, simulated: Simulated, channel: Channel) -> spectra.Coherence:
+        """Coherence of measured and simulated series, a vane's with its slow turning included."""
+        name = channel.name
+        measured, expected = self.measured.series[name], simulated.series[name]
+        if channel.kind == "vane_angle":
+            slow = (self.direction - np.mean(self.direction)) * self.speed
+            measured, expected = measured + slow, expected + slow
+        n = self.coefficients
+        return spectra.coherence_of(
+            spectra.to_cosine(measured)[:n], spectra.to_cosine(expected)[:n],
+            self.grid.dt, self.grid.n,
+        )  # fmt: skip
 
     def vector(self, simulated: Simulated, trust: Mapping[str, Trust]) -> FloatArray:
         """Whitened differences of all channels, then of all statistics."""

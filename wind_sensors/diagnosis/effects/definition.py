@@ -86,6 +86,10 @@ class Effect:
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None
 
+    def __reduce__(self) -> tuple[Callable[[str], Effect], tuple[str]]:
+        """Effects travel between processes by their name."""
+        return _named, (self.name,)
+
     def relative_size(self, values: Values) -> float:
         """Size of the effect in units of the smallest size worth reporting."""
         if self.size is not None:
@@ -96,6 +100,12 @@ class Effect:
             if p.healthy is not None and p.minimum > 0.0
         ]
         return max(sizes, default=0.0)
+
+
+def _named(name: str) -> Effect:
+    from wind_sensors.diagnosis.effects import catalogue
+
+    return catalogue()[name]
 
 
 def entry_of(station: Station, instrument: str) -> Instrument | Platform:

@@ -1,0 +1,141 @@
+"""What healthy recordings of a station show: the standing difference from its simulation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.observation import HARMONICS, NORMALISED_BANDS, Channel
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
+"""Frequencies at which a baseline keeps its curves [Hz]."""
+
+_BANDS = len(NORMALISED_BANDS) - 1
+_SPECTRUM_PRIOR = 0.22
+_SHARE_PRIOR = 0.003
+_AMPLITUDE_PRIOR = 0.012
+
+
+def statistics_prior(channel: Channel) -> FloatArray:
+    """Standard deviations expected of a channel's statistics before any healthy recording."""
+    bands = np.full(_BANDS, _SPECTRUM_PRIOR)
+    if channel.kind == "vane_angle":
+        return bands
+    return np.concatenate(
+        (bands, np.full(2, _SHARE_PRIOR), np.full(2 * HARMONICS, _AMPLITUDE_PRIOR))
+    )
+
+
+@dataclass(frozen=True)
+class ChannelBaseline:
+    """Standing behaviour of one channel.
+
+    Attributes:
+        exponent: Slope of measured on simulated as a power of the squared coherence, at
+            `FREQUENCIES`.
+        low_ratio: Noise variance relative to that just above the low end, at `FREQUENCIES`.
+        statistics_mean, statistics_deviation: Of measured minus simulated statistics.
+    """
+
+    exponent: FloatArray
+    low_ratio: FloatArray
+    statistics_mean: FloatArray
+    statistics_deviation: FloatArray
+
+    def exponent_at(self, frequency: FloatArray) -> FloatArray:
+        """Exponents at other frequencies [Hz]."""
+        return np.interp(np.log(frequency + 1e-6), np.log(FREQUENCIES), self.exponent)
+
+    def low_ratio_at(self, frequency: FloatArray) -> FloatArray:
+        """Noise ratios at other frequencies [Hz]."""
+        return np.interp(np.log(frequency + 1e-6), np.log(FREQUENCIES), self.low_ratio)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Everything learnt on healthy recordings of one station.
+
+    Attributes:
+        recordings: Names of the recordings; empty: none were given (null not calibrated).
+        station: The station as commissioned: its file with the standing differences that a gain,
+            an offset, a mounting angle can describe.
+        channels: By channel name.
+        means: Amplitude of each template shared by the healthy recordings, by
+            `effect|instrument|template number`, in units of the template.
+        standing: Scatter of each template's amplitude between them.
+        checks: Largest values of the omnibus checks on the healthy recordings, by name.
+    """
+
+    recordings: tuple[str, ...]
+    station: Station
+    channels: Mapping[str, ChannelBaseline]
+    means: Mapping[str, float] = field(default_factory=dict)
+    standing: Mapping[str, float] = field(default_factory=dict)
+    checks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether healthy recordings stand behind it."""
+        return bool(self.recordings)
+
+    def to_json(self) -> str:
+        """As text; arrays become lists."""
+        content: dict[str, Any] = {
+            "recordings": list(self.recordings),
+            "station": self.station.model_dump(mode="json"),
+            "channels": {
+                name: {k: np.asarray(v).tolist() for k, v in asdict(c).items()}
+                for name, c in self.channels.items()
+            },
+            "means": dict(self.means),
+            "standing": dict(self.standing),
+            "checks": {k: list(v) for k, v in self.checks.items()},
+        }
+        return json.dumps(content, indent=1)
+
+    @staticmethod
+    def from_json(text: str) -> Baseline:
+        """Inverse of `to_json`.
+
+        Raises:
+            ValueError: The text is not a baseline.
+        """
+        content = json.loads(text)
+        try:
+            return Baseline(
+                recordings=tuple(content["recordings"]),
+                station=Station.model_validate(content["station"]),
+                channels={
+                    name: ChannelBaseline(**{k: np.asarray(v) for k, v in c.items()})
+                    for name, c in content["channels"].items()
+                },
+                means=content["means"],
+                standing=content["standing"],
+                checks={k: tuple(v) for k, v in content["checks"].items()},
+            )
+        except (KeyError, TypeError) as problem:
+            raise ValueError(f"not a baseline: {problem}") from problem
+
+
+def default_channel(channel: Channel) -> ChannelBaseline:
+    """What is expected of a channel without any healthy recording.
+
+    Errors of the reference below 0.1 Hz are its own (exponent 1), above they are the distance
+    between reference and instrument, which both share (1/2).
+    """
+    exponent = np.where(FREQUENCIES < 0.1, 1.0, 0.5)
+    prior = statistics_prior(channel)
+    return ChannelBaseline(
+        exponent=exponent,
+        low_ratio=np.ones(FREQUENCIES.size),
+        statistics_mean=np.zeros(prior.size),
+        statistics_deviation=2.0 * prior,
+    )

@@ -1,0 +1,213 @@
+"""Nonlinear fits of effects: the compiled simulation inside a damped least-squares search."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparison import Simulated
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
+from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+Interval = tuple[float, float | None]
+ALWAYS: Interval = (0.0, None)
+
+_LARGEST_DAMPING = 1e5
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect at work: one instrument, one set of values, one interval.
+
+    Attributes:
+        effect: The effect.
+        instrument: Name of the instrument, or `platform`.
+        values: Parameters.
+        interval: Start and end [s since the start of the recording]; (0, None) is always.
+    """
+
+    effect: Effect
+    instrument: str
+    values: Mapping[str, float]
+    interval: Interval = ALWAYS
+
+    def planted(self, station: Station) -> Station:
+        """The station with the effect."""
+        return with_effect(station, self.effect, self.instrument, self.values, self.interval)
+
+    @property
+    def relative_size(self) -> float:
+        """Size in units of the smallest worth reporting."""
+        return self.effect.relative_size(self.values)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and instrument."""
+        return self.effect.name, self.instrument
+
+
+def planted(station: Station, terms: Sequence[Term]) -> Station:
+    """The station with all terms.
+
+    Terms that always hold come first, so that changes build on them.
+    """
+    for term in sorted(terms, key=lambda t: t.interval != ALWAYS):
+        station = term.planted(station)
+    return station
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Terms fitted to a recording.
+
+    Attributes:
+        terms: With the fitted values.
+        cost: Squared length of the white vector (minus twice the log-likelihood).
+        vector: White vector at the fit.
+        simulated: Simulation at the fit.
+        covariance: Of all parameters, in the order of the terms and their parameters.
+        evaluations: Number of simulations it took.
+    """
+
+    terms: tuple[Term, ...]
+    cost: float
+    vector: FloatArray
+    simulated: Simulated
+    covariance: FloatArray
+    evaluations: int
+
+
+def _parameters(terms: Sequence[Term]) -> list[tuple[int, Parameter]]:
+    return [(k, p) for k, term in enumerate(terms) for p in term.effect.parameters]
+
+
+def _with_values(terms: Sequence[Term], values: FloatArray) -> tuple[Term, ...]:
+    out = []
+    place = 0
+    for term in terms:
+        names = [p.name for p in term.effect.parameters]
+        part = values[place : place + len(names)]
+        place += len(names)
+        out.append(replace(term, values=dict(zip(names, part.tolist(), strict=True))))
+    return tuple(out)
+
+
+def values_of(terms: Sequence[Term]) -> FloatArray:
+    """All parameters of all terms."""
+    return np.array([term.values[p.name] for term in terms for p in term.effect.parameters])
+
+
+class Problem:
+    """Terms to be fitted over a station in one recording.
+
+    Args:
+        whitener: The null of the recording.
+        station: The station as commissioned.
+        terms: Effects with starting values.
+        rest: Simulation whose other instruments are taken over; None: simulate all.
+    """
+
+    def __init__(
+        self, whitener: Whitener, station: Station, terms: Sequence[Term], rest: Simulated | None
+    ) -> None:
+        self._whitener = whitener
+        self._station = station
+        self._terms = tuple(terms)
+        self._rest = rest
+        comparison = whitener.comparison
+        self._only: tuple[str, ...] = ()
+        if rest is not None:
+            touched = {
+                name for term in terms for name in comparison.affected(station, term.instrument)
+            }
+            self._only = tuple(sorted(touched))
+        self.evaluations = 0
+
+    def simulate(self, values: FloatArray) -> Simulated:
+        """Simulation with given parameters."""
+        self.evaluations += 1
+        terms = _with_values(self._terms, values)
+        return self._whitener.comparison.simulate(
+            planted(self._station, terms), self._only, self._rest
+        )
+
+    def vector(self, values: FloatArray) -> tuple[FloatArray, Simulated]:
+        """White vector and simulation."""
+        simulated = self.simulate(values)
+        return self._whitener.of(simulated), simulated
+
+    def jacobian(
+        self, values: FloatArray, base: FloatArray, low: FloatArray, high: FloatArray
+    ) -> FloatArray:
+        """Derivatives of the white vector, shape (m, parameters), in units of the step."""
+        columns = []
+        for k, (_, parameter) in enumerate(_parameters(self._terms)):
+            step = parameter.difference
+            if values[k] + step > high[k]:
+                step = -step
+            moved = values.copy()
+            moved[k] = min(max(values[k] + step, low[k]), high[k])
+            shift = (moved[k] - values[k]) / parameter.difference
+            columns.append((self.vector(moved)[0] - base) / (shift if shift else 1.0))
+        return np.array(columns).T
+
+
+def fit(
+    whitener: Whitener,
+    station: Station,
+    terms: Sequence[Term],
+    rest: Simulated | None = None,
+    iterations: int = 8,
+) -> Fit:
+    """Fit terms by damped least squares within their bounds.
+
+    Args:
+        whitener: The null of the recording.
+        station: The station as commissioned.
+        terms: Effects with starting values.
+        rest: Simulation of the station whose untouched instruments are reused.
+        iterations: Largest number of Gauss-Newton steps.
+    """
+    problem = Problem(whitener, station, terms, rest)
+    parameters = [p for _, p in _parameters(terms)]
+    low = np.array([p.low for p in parameters])
+    high = np.array([p.high for p in parameters])
+    scale = np.array([p.difference for p in parameters])
+    values = np.clip(values_of(terms), low, high)
+    vector, simulated = problem.vector(values)
+    cost = float(vector @ vector)
+    damping = 1e-2
+    normal = np.eye(len(values))
+    for _ in range(iterations):
+        jacobian = problem.jacobian(values, vector, low, high)
+        normal = jacobian.T @ jacobian
+        gradient = jacobian.T @ vector
+        improved = False
+        gained = 0.0
+        while damping < _LARGEST_DAMPING:
+            weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
+            step = -np.linalg.solve(weighted, gradient) * scale
+            trial = np.clip(values + step, low, high)
+            trial_vector, trial_simulated = problem.vector(trial)
+            trial_cost = float(trial_vector @ trial_vector)
+            if trial_cost < cost:
+                gained = cost - trial_cost
+                values, vector, simulated, cost = (
+                    trial, trial_vector, trial_simulated, trial_cost,
+                )  # fmt: skip
+                damping = max(damping * 0.2, 1e-6)
+                improved = True
+                break
+            damping *= 8.0
+        if not improved or gained < 0.02 + 1e-5 * cost:
+            break
+    information = normal / np.outer(scale, scale)
+    covariance = np.linalg.pinv(information + np.diag(1e-9 / (high - low) ** 2))
+    fitted = _with_values(terms, values)
+    return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations)

@@ -1,0 +1,180 @@
+"""Starting points that the raw signals give away: steps, gaps, repeats, pulse intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.station.model import Angle, Rotor, Station
+
+FloatArray = npt.NDArray[np.float64]
+Guesses = dict[tuple[str, str], list[Term]]
+
+LONGEST_REPEAT = 4.0
+"""A vane that repeats one reading for longer [s] in a wind that turns it is taken to be stuck."""
+
+LONGEST_SILENCE = 4.0
+"""A rotor without a pulse for longer [s], while it should turn fast, is taken to be silent."""
+
+_RATE_THAT_TURNS = 1.5
+
+
+def _term(effect: str, instrument: str, **values: float) -> Term:
+    return Term(catalogue()[effect], instrument, values)
+
+
+def guesses_of(comparison: Comparison, station: Station) -> Guesses:
+    """Effects that the raw signals suggest, with starting values, by effect and instrument."""
+    out: Guesses = {}
+    simulated = comparison.simulate(station)
+    for channel in comparison.channels:
+        entry = station.instrument(channel.instrument)
+        if isinstance(entry, Rotor):
+            rate = simulated.series[channel.name]
+            terms = [
+                *_pulse_guesses(comparison, station, entry),
+                *_silence(comparison, entry, rate),
+            ]
+        else:
+            assert isinstance(entry, Angle)
+            terms = [*_reading_guesses(comparison, entry), *_repeats(comparison, entry)]
+        for term in terms:
+            out.setdefault(term.key, []).append(term)
+    return out
+
+
+def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> list[Term]:
+    time = comparison.grid.seconds(comparison.recording.pulses[rotor.name].time)
+    expected, _ = comparison.signals(station, (rotor.name,))
+    expected_time = comparison.grid.seconds(expected[rotor.name].time)
+    if time.size < 100 or expected_time.size < 100:
+        return []
+    interval, usual = np.diff(time), np.diff(expected_time)
+    local = np.interp(time[1:], expected_time[1:], np.convolve(usual, np.ones(9) / 9.0, "same"))
+    relative = interval / np.maximum(local, 1e-9)
+    out = []
+    long = float(np.mean(relative > 1.6))
+    short = float(np.mean(relative < 0.4))
+    usual_long = float(np.mean(usual[1:] > 1.6 * usual[:-1]))
+    if long > 0.004 + 2.0 * usual_long:
+        out.append(
+            _term("missed_pulses", rotor.name, dead_time=0.0, loss_probability=min(long, 0.6))
+        )
+    shortest = float(np.quantile(interval, 0.001))
+    if np.mean(usual < 0.97 * shortest) > 0.004:
+        for share in (1.0, 0.9):
+            out.append(
+                _term(
+                    "missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0
+                )
+            )
+    if short > 0.004:
+        delay = float(np.median(interval[relative < 0.4]))
+        out.append(
+            _term(
+                "extra_pulses", rotor.name,
+                bounce_probability=min(2.0 * short, 0.9), bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
+            )
+        )  # fmt: skip
+    name = f"{rotor.name}/rotor_rate"
+    locked = comparison.measured.statistics[name][-4]
+    if rotor.pulses_per_revolution > 2 and locked > 0.02:
+        out.extend(
+            _term("encoder_slot_error", rotor.name, sine=size * locked, cosine=0.0)
+            for size in (0.5, 1.0)
+        )
+    return out
+
+
+def _silence(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:
+    time = comparison.grid.seconds(comparison.recording.pulses[rotor.name].time)
+    length = comparison.grid.n * comparison.grid.dt
+    edges = np.concatenate(([0.0], np.clip(time, 0.0, length), [length]))
+    gaps = np.diff(edges)
+    longest = int(np.argmax(gaps))
+    begin, end = float(edges[longest]), float(edges[longest + 1])
+    if end - begin < LONGEST_SILENCE:
+        return []
+    inside = rate[int(begin / comparison.grid.dt) : int(end / comparison.grid.dt)]
+    if inside.size == 0 or np.median(inside) < _RATE_THAT_TURNS:
+        return []
+    since = comparison.drive.elapsed
+    return [_term("stuck_sensor", rotor.name, start=begin + since, stop=end + since)]
+
+
+def _repeats(comparison: Comparison, vane: Angle) -> list[Term]:
+    readings = comparison.recording.angles[vane.name]
+    time = comparison.grid.seconds(readings.time)
+    if time.size < 50:
+        return []
+    changed = np.flatnonzero(np.abs(np.diff(readings.angle)) > 1e-9) + 1
+    starts = np.concatenate(([0], changed))
+    stops = np.concatenate((changed, [time.size])) - 1
+    lasting = time[stops] - time[starts]
+    longest = int(np.argmax(lasting))
+    usual = float(np.quantile(lasting, 0.98))
+    if lasting[longest] < max(LONGEST_REPEAT, 4.0 * usual):
+        return []
+    since = comparison.drive.elapsed
+    return [
+        _term(
+            "stuck_sensor", vane.name,
+            start=float(time[starts[longest]]) + since, stop=float(time[stops[longest]]) + since,
+        )
+    ]  # fmt: skip
+
+
+def _reading_guesses(comparison: Comparison, vane: Angle) -> list[Term]:
+    readings = comparison.recording.angles[vane.name].angle
+    readings = readings[np.isfinite(readings)]
+    if readings.size < 200:
+        return []
+    out = []
+    degrees = np.degrees(readings)
+    values, counts = np.unique(np.round(degrees, 4), return_counts=True)
+    steps = np.diff(values)
+    steps = steps[steps > 0.02]
+    if values.size < 0.25 * readings.size and steps.size > 1:
+        step = float(np.median(steps[steps < 1.5 * np.quantile(steps, 0.2) + 1e-9]))
+        if np.sum(counts) / values.size > 8.0 and step > 0.3:
+            out.append(_term("quantisation", vane.name, step=step))
+    common = values[counts > max(0.004 * readings.size, 20)]
+    if 1 <= common.size <= 3:
+        low, high = float(common.min()), float(common.max())
+        if common.size == 1:
+            for side in (-1.0, 1.0):
+                out.append(
+                    _term("potentiometer_gap", vane.name, centre=low + 5.0 * side, width=10.0)
+                )
+        else:
+            width = high - low
+            centre = 0.5 * (low + high)
+            if width > 180.0:
+                width, centre = 360.0 - width, centre + 180.0
+            if width < 90.0:
+                out.append(_term("potentiometer_gap", vane.name, centre=centre, width=width))
+    hole = _hole(degrees)
+    if hole is not None:
+        out.append(_term("potentiometer_gap", vane.name, centre=hole[0], width=hole[1]))
+    return out
+
+
+def _hole(degrees: FloatArray) -> tuple[float, float] | None:
+    """Centre and width of a sector without readings between sectors with many [deg]."""
+    counts, _ = np.histogram(np.mod(degrees, 360.0), bins=360, range=(0.0, 360.0))
+    around = np.convolve(np.concatenate((counts[-20:], counts, counts[:20])), np.ones(41), "valid")
+    empty = (counts < 0.03 * around / 41.0) & (around > 0.02 * degrees.size)
+    if not empty.any():
+        return None
+    doubled = np.concatenate((empty, empty))
+    best, run, at = 0, 0, 0
+    for k, is_empty in enumerate(doubled):
+        run = run + 1 if is_empty else 0
+        if run > best:
+            best, at = run, k
+    if best < 3 or best > 60:
+        return None
+    return float((at - 0.5 * best + 0.5) % 360.0), float(best)

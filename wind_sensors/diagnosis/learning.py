@@ -1,0 +1,321 @@
+"""Learning a baseline from healthy recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.baseline import (
+    FREQUENCIES,
+    Baseline,
+    ChannelBaseline,
+    default_channel,
+    statistics_prior,
+)
+from wind_sensors.diagnosis.comparison import LOW_END, Comparison, prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import Effect, with_effect
+from wind_sensors.diagnosis.observation import channels_of
+from wind_sensors.diagnosis.signatures import in_parallel, signature_bank, templates_of
+from wind_sensors.diagnosis.whitening import trust_of, unstanding, whitener_of
+from wind_sensors.station.model import Angle, Rotor, Station
+from wind_sensors.station.signals import Recording
+
+FloatArray = npt.NDArray[np.float64]
+
+STANDING_TOLERANCES = (
+    ("calibration_drift", "gain", 0.01),
+    ("calibration_offset", "offset", 0.05),
+    ("vane_offset", "offset", 1.0),
+)
+"""What commissioning may correct: effect, parameter, tolerance of the certificate."""
+
+_PRIOR_STRENGTH = 3.0
+"""Weight of the prior in healthy variances, in recordings."""
+
+_STANDING_FACTOR = 1.3
+
+STANDING_MEAN_PRIOR = 0.7
+"""Prior deviation of the shared amplitudes, in templates."""
+
+LARGEST_SHARED_BANK = 4
+"""Effects with more templates than this have no shared amplitude, only a scatter."""
+
+
+def default_baseline(station: Station) -> Baseline:
+    """A baseline from certificate tolerances alone: no healthy recording was given."""
+    return Baseline((), station, {c.name: default_channel(c) for c in channels_of(station)})
+
+
+def _exponents(comparisons: Sequence[Comparison], name: str, station: Station) -> FloatArray:
+    """Slope as a power of the squared coherence, pooled over recordings and nearby bands."""
+    prior = np.where(FREQUENCIES < 0.1, 1.0, 0.5)
+    numerator, denominator = 4.0 * prior, np.full(FREQUENCIES.size, 4.0)
+    log_frequency = np.log(FREQUENCIES)
+    for comparison in comparisons:
+        channel = next(c for c in comparison.channels if c.name == name)
+        coherence = comparison.coherence(comparison.simulate(station), channel)
+        slope = coherence.cross / coherence.simulated
+        count = np.diff(coherence.edges)
+        usable = (coherence.squared > 0.05) & (coherence.squared < 0.985) & (slope > 0.0)
+        for k in np.flatnonzero(usable):
+            x = float(np.log(coherence.squared[k]))
+            y = float(np.log(slope[k]))
+            near = np.exp(-0.5 * ((np.log(coherence.frequency[k]) - log_frequency) / 0.35) ** 2)
+            # The slope's scatter is that of a correlation with `count` degrees of freedom.
+            weight = near * count[k] * coherence.squared[k] / (1.0 - coherence.squared[k])
+            numerator += weight * x * y
+            denominator += weight * x * x
+    return np.asarray(np.clip(numerator / denominator, 0.3, 1.3))
+
+
+def _low_ratios(
+    comparisons: Sequence[Comparison], station: Station, baseline: Baseline, name: str
+) -> FloatArray:
+    """Noise at low frequencies relative to the level just above the low end."""
+    total, weight = np.full(FREQUENCIES.size, 2.0), np.full(FREQUENCIES.size, 2.0)
+    for comparison in comparisons:
+        simulated = comparison.simulate(station)
+        trust = trust_of(comparison, simulated, baseline)[name]
+        residual = comparison.measured.cosine[name] - trust.slope * simulated.cosine[name]
+        edges = spectra.band_edges(residual.size)
+        power = spectra.band_means(residual * residual, edges)
+        frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * comparison.grid.n * 0.2)
+        first = int(np.searchsorted(frequency, LOW_END))
+        level = float(np.exp(np.mean(np.log(power[first : first + 3]))))
+        for k, f in enumerate(frequency):
+            near = np.exp(-0.5 * ((np.log(f + 5e-4) - np.log(FREQUENCIES)) / 0.4) ** 2)
+            total += near * min(power[k] / level, 6.0)
+            weight += near
+    return np.asarray(np.clip(total / weight, 0.2, 6.0))
+
+
+def _statistics(
+    comparisons: Sequence[Comparison], station: Station, name: str
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and deviation of measured minus simulated statistics, shrunk towards the prior."""
+    channel = next(c for c in channels_of(station) if c.name == name)
+    prior = statistics_prior(channel)
+    rows = np.array(
+        [
+            c.measured.statistics[name] - c.simulate(station).statistics[name]
+            for c in comparisons
+        ]
+    )
+    seen = np.isfinite(rows)
+    count = seen.sum(axis=0)
+    filled = np.where(seen, rows, 0.0)
+    # A mean of few recordings is itself uncertain, which the deviation has to carry.
+    mean = filled.sum(axis=0) / (count + 0.25)
+    squares = np.where(seen, (rows - mean) ** 2, 0.0).sum(axis=0)
+    variance = (squares + _PRIOR_STRENGTH * prior**2) / (count + _PRIOR_STRENGTH - 1.0)
+    variance = variance * (1.0 + 1.0 / (count + 0.25))
+    return mean, np.sqrt(variance)
+
+
+def _commissioned(
+    comparisons: Sequence[Comparison], station: Station, baseline: Baseline
+) -> Station:
+    """The station with the gains, offsets and mounting angles that its healthy days show."""
+    effects = catalogue()
+    terms: list[tuple[Effect, str, str, float]] = []
+    for effect_name, parameter, tolerance in STANDING_TOLERANCES:
+        effect = effects[effect_name]
+        terms.extend(
+            (effect, entry.name, parameter, tolerance)
+            for entry in station.instruments
+            if isinstance(entry, Rotor | Angle) and effect.applies(entry, station)
+        )
+    current = station
+    for _ in range(2):
+        normal = np.eye(len(terms))
+        right = np.zeros(len(terms))
+        for comparison in comparisons:
+            without = comparison.simulate(current)
+            trust = trust_of(comparison, without, baseline)
+            whitener = unstanding(comparison, trust)
+            nothing = whitener.of(without)
+            size = sum(v.size for v in without.cosine.values())
+            columns = []
+            for effect, name, parameter, tolerance in terms:
+                healthy = effect.parameters[0].healthy or 0.0
+                values = {parameter: healthy + tolerance}
+                planted = with_effect(current, effect, name, values)
+                only = comparison.affected(current, name)
+                moved = whitener.of(comparison.simulate(planted, only, without))
+                columns.append((nothing - moved)[:size])
+            g = np.array(columns)
+            # Recordings differ by more than their noise: each counts as one witness whose
+            # standing scatter is a third of the tolerance.
+            inner = np.linalg.inv(np.linalg.inv(g @ g.T + 1e-6 * np.eye(len(terms)))
+                                  + np.eye(len(terms)) / 9.0)
+            estimate = np.linalg.solve(g @ g.T + 1e-6 * np.eye(len(terms)), g @ nothing[:size])
+            normal += inner
+            right += inner @ estimate
+        amplitudes = np.linalg.solve(normal, right)
+        for (effect, name, parameter, tolerance), amplitude in zip(
+            terms, amplitudes, strict=True
+        ):
+            healthy = effect.parameters[0].healthy or 0.0
+            values = {parameter: healthy + tolerance * float(amplitude)}
+            current = with_effect(current, effect, name, values)
+    return current
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What one healthy recording says about the amplitudes of the templates.
+
+    Attributes:
+        keys: Of the templates.
+        gram: Products of the noise-whitened signatures, shape (k, k).
+        seen: Products of the signatures with the residual, shape (k,).
+        inner: Products of the signatures when every effect may stand at its least size.
+        inner_seen: The same with the residual.
+    """
+
+    keys: tuple[str, ...]
+    gram: FloatArray
+    seen: FloatArray
+    inner: FloatArray
+    inner_seen: FloatArray
+
+
+def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
+    """What a healthy recording says about every template."""
+    templates = templates_of(comparison, baseline.station, catalogue())
+    bank = signature_bank(comparison, baseline.station, templates)
+    trust = trust_of(comparison, bank.without, baseline)
+    signatures = bank.whitened(comparison, trust)
+    residual = comparison.vector(bank.without, trust)
+    least = np.array([t.smallest_standing for t in templates])
+    whitener = whitener_of(comparison, trust, signatures, least)
+    white = whitener.through_standing(signatures)
+    return Evidence(
+        keys=tuple(t.key for t in templates),
+        gram=signatures @ signatures.T,
+        seen=signatures @ residual,
+        inner=white @ white.T,
+        inner_seen=white @ whitener.through_standing(residual),
+    )
+
+
+def _bank(key: str) -> str:
+    return key.rpartition("|")[0]
+
+
+def standing_means(rows: Sequence[Evidence]) -> dict[str, float]:
+    """Amplitudes that all healthy recordings share, effects with few templates only."""
+    every = sorted({key for row in rows for key in row.keys})
+    crowd = {key: sum(_bank(k) == _bank(key) for k in every) for key in every}
+    keys = [key for key in every if crowd[key] <= LARGEST_SHARED_BANK]
+    place = {key: k for k, key in enumerate(keys)}
+    normal = np.eye(len(keys)) / STANDING_MEAN_PRIOR**2
+    right = np.zeros(len(keys))
+    for row in rows:
+        used = [k for k, key in enumerate(row.keys) if key in place]
+        target = [place[row.keys[k]] for k in used]
+        normal[np.ix_(target, target)] += row.inner[np.ix_(used, used)]
+        right[target] += row.inner_seen[used]
+    solved = np.linalg.solve(normal, right)
+    return {key: float(solved[k]) for key, k in place.items()}
+
+
+def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict[str, float]:
+    """Standing scatter of each template about the shared amplitudes.
+
+    Banks of templates (bearings) have none of their own: few healthy recordings see each of them,
+    and what errors of the reference do to them is in the noise.
+    """
+    amplitudes: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        shared = np.array([means.get(key, 0.0) for key in row.keys])
+        power = np.diag(row.gram)
+        rest = row.seen - row.gram @ shared
+        for k, key in enumerate(row.keys):
+            if power[k] > 1e-3:
+                amplitudes.setdefault(key, []).append(
+                    (float(rest[k] / power[k]), float(power[k] ** -0.5))
+                )
+    out = {}
+    for key, seen in amplitudes.items():
+        if sum(_bank(other) == _bank(key) for other in amplitudes) > LARGEST_SHARED_BANK:
+            continue
+        b = np.array([a for a, _ in seen])
+        error = np.array([e for _, e in seen])
+        # Recordings that can hardly show the effect say little about its standing size.
+        weight = 1.0 / error**2
+        mean = float(np.sum(weight * (b**2 - error**2)) / np.sum(weight))
+        out[key] = float(np.sqrt(_STANDING_FACTOR * max(0.0, mean)))
+    return out
+
+
+def learn(
+    recordings: Sequence[Recording],
+    station: Station | None = None,
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Baseline:
+    """Learn what healthy recordings of one station show.
+
+    Args:
+        recordings: Healthy recordings; none gives a baseline from certificate tolerances.
+        station: The station; None: that of the first recording.
+        workers: Processes.
+        progress: Called with the share done.
+    """
+    if station is None:
+        station = recordings[0].station
+    baseline = default_baseline(station)
+    if not recordings:
+        return baseline
+    comparisons = [prepare(r, station) for r in recordings]
+    names = [c.name for c in channels_of(station)]
+
+    def of(name: str) -> list[Comparison]:
+        return [c for c in comparisons if any(ch.name == name for ch in c.channels)]
+
+    def updated(known: Baseline, current: Station) -> Baseline:
+        channels: dict[str, ChannelBaseline] = dict(known.channels)
+        for name in names:
+            if not of(name):
+                continue
+            exponent = _exponents(of(name), name, current)
+            channels[name] = replace(channels[name], exponent=exponent)
+        known = replace(known, station=current, channels=channels)
+        for name in names:
+            if not of(name):
+                continue
+            low = _low_ratios(of(name), current, known, name)
+            mean, deviation = _statistics(of(name), current, name)
+            channels[name] = replace(
+                channels[name],
+                low_ratio=low,
+                statistics_mean=mean,
+                statistics_deviation=deviation,
+            )
+        return replace(known, channels=channels)
+
+    baseline = updated(baseline, station)
+    if progress:
+        progress(0.1)
+    baseline = updated(baseline, _commissioned(comparisons, station, baseline))
+    if progress:
+        progress(0.2)
+    rows = in_parallel(
+        lambda c: evidence_of(c, baseline),
+        comparisons,
+        workers,
+        (lambda share: progress(0.2 + 0.8 * share)) if progress else None,
+    )
+    means = standing_means(rows)
+    return replace(
+        baseline,
+        recordings=tuple(r.name for r in recordings),
+        means=means,
+        standing=standing_sizes(rows, means),
+    )

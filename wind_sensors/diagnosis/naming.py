@@ -1,0 +1,262 @@
+"""From scores to names: accept, compare, remove."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.screening import group_templates, screen, screen_windows
+from wind_sensors.diagnosis.search import (
+    PENALTY_PER_INTERVAL,
+    PENALTY_PER_PARAMETER,
+    Searcher,
+)
+from wind_sensors.diagnosis.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
+
+ACCEPTED_GAIN = 22.0
+"""Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
+
+ACCEPTED_FURTHER_GAIN = 30.0
+"""The same for a second and a third effect."""
+
+SMALLEST_SIZE = 1.0
+"""In units of the smallest size worth reporting."""
+
+MOST_EFFECTS = 3
+
+FIRST_CANDIDATES = 9
+LATER_CANDIDATES = 6
+WINDOW_CANDIDATES = 4
+WINDOW_ADVANTAGE = 12.0
+FINALISTS = 5
+
+
+def parameter_cost(terms: Sequence[Term]) -> float:
+    """What the parameters and intervals of terms cost."""
+    cost = 0.0
+    for term in terms:
+        cost += PENALTY_PER_PARAMETER * len(term.effect.parameters)
+        if term.interval != ALWAYS:
+            cost += PENALTY_PER_INTERVAL * sum(
+                (term.interval[0] > 0.0, term.interval[1] is not None)
+            )
+    return cost
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """An explanation that lost.
+
+    Attributes:
+        fit: Its fit.
+        behind: How far its penalised cost lies above the winner's.
+    """
+
+    fit: Fit
+    behind: float
+
+
+@dataclass(frozen=True)
+class Naming:
+    """The explanation of a recording.
+
+    Attributes:
+        fit: Named terms, fitted; no terms: nothing was accepted.
+        whitener: The null in which the fit was made.
+        nothing: White vector without any effect, in that null.
+        gain: Drop of the cost.
+        alternatives: Losers of the last round, for each accepted term, nearest first.
+        screened: Best scores of the first screening: effect, instrument, gain.
+    """
+
+    fit: Fit
+    whitener: Whitener
+    nothing: FloatArray
+    gain: float
+    alternatives: tuple[Alternative, ...] = ()
+    screened: tuple[tuple[str, str, float], ...] = field(default=())
+
+
+def _no_terms(whitener: Whitener, searcher: Searcher) -> Fit:
+    vector = whitener.of(searcher.bank.without)
+    return Fit((), float(vector @ vector), vector, searcher.bank.without, np.zeros((0, 0)), 0)
+
+
+def _total(candidate: Fit) -> float:
+    return candidate.cost + parameter_cost(candidate.terms)
+
+
+def _large_enough(candidate: Fit) -> bool:
+    return candidate.terms[-1].relative_size >= SMALLEST_SIZE
+
+
+def _window_starts(
+    searcher: Searcher, whitener: Whitener, vector: FloatArray, used: set[tuple[str, str]]
+) -> list[list[Term]]:
+    """Effects that explain clearly more when they hold in a part of the record only."""
+    signatures = searcher.white_signatures(whitener)
+    groups = group_templates(searcher.bank.templates)
+    power = np.einsum("ij,ij->i", signatures, signatures)
+    ranked = []
+    length = searcher.comparison.grid.n * searcher.comparison.grid.dt
+    since = searcher.comparison.drive.elapsed
+    scores = screen(searcher.bank.templates, signatures, vector)
+    found: list[tuple[float, list[Term]]] = []
+    for score in scores[: 2 * WINDOW_CANDIDATES]:
+        key = (score.effect, score.instrument)
+        if key in used or score.effect == "stuck_sensor":
+            continue
+        members = groups[key]
+        strong = sorted(
+            (k for k in members if power[k] > 1e-2),
+            key=lambda k: -((signatures[k] @ vector) ** 2 / power[k]),
+        )[:2]
+        if not strong:
+            continue
+        gain, window, amplitude, which = screen_windows(
+            whitener, searcher.bank, strong, vector
+        )
+        if window is None or gain < score.gain + WINDOW_ADVANTAGE:
+            continue
+        template = searcher.bank.templates[which]
+        values = dict(template.values)
+        for p in template.effect.parameters:
+            if p.healthy is not None:
+                moved = p.healthy + amplitude * (values[p.name] - p.healthy)
+                values[p.name] = float(np.clip(moved, p.low, p.high))
+        interval = (
+            window[0] + since if window[0] > 0.0 else 0.0,
+            None if window[1] >= length else window[1] + since,
+        )
+        found.append((gain, [Term(template.effect, score.instrument, values, interval)]))
+    ranked = sorted(found, key=lambda pair: -pair[0])
+    return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
+
+
+def refined_interval(
+    searcher: Searcher, whitener: Whitener, fixed: Sequence[Term], candidate: Fit
+) -> Fit:
+    """The fit with its last term's beginning and end moved to where they fit best."""
+    best = candidate
+    for step in (15.0, 5.0, 2.0):
+        for side in (0, 1):
+            for direction in (-1.0, 1.0):
+                for _ in range(3):
+                    term = best.terms[-1]
+                    start, stop = term.interval
+                    if side == 0 and start > 0.0:
+                        interval = (max(start + direction * step, 0.1), stop)
+                    elif side == 1 and stop is not None:
+                        interval = (start, stop + direction * step)
+                    else:
+                        break
+                    if interval[1] is not None and interval[1] - interval[0] < 5.0:
+                        break
+                    moved = replace(term, interval=interval)
+                    trial = fit(
+                        whitener, searcher.station, [*fixed, moved],
+                        searcher.bank.without, iterations=1,
+                    )  # fmt: skip
+                    if trial.cost >= best.cost - 0.5:
+                        break
+                    best = trial
+    return best
+
+
+def name(
+    searcher: Searcher, progress: Callable[[float], None] | None = None
+) -> Naming:
+    """Find the effects that explain the recording.
+
+    Args:
+        searcher: Prepared search.
+        progress: Called with the share done.
+    """
+    whitener = searcher.whitener(searcher.bank.without)
+    current = _no_terms(whitener, searcher)
+    screened = tuple(
+        (s.effect, s.instrument, s.gain)
+        for s in screen(
+            searcher.bank.templates, searcher.white_signatures(whitener), current.vector
+        )[:12]
+    )
+    alternatives: tuple[Alternative, ...] = ()
+    for turn in range(MOST_EFFECTS):
+        first = turn == 0
+        fixed = current.terms
+        used = {t.key for t in fixed}
+        number = FIRST_CANDIDATES if first else LATER_CANDIDATES
+        candidates = [
+            starts
+            for starts in searcher.single_candidates(whitener, current.vector, number)
+            if starts[0].key not in used
+        ]
+        windowed = _window_starts(searcher, whitener, current.vector, used)
+        fits = searcher.fit_all(whitener, fixed, [*candidates, *windowed])
+        fits = sorted((f for f in fits if _large_enough(f)), key=_total)
+        needed = ACCEPTED_GAIN if first else ACCEPTED_FURTHER_GAIN
+        if progress:
+            progress((turn + 0.6) / MOST_EFFECTS)
+        if not fits or _total(current) - _total(fits[0]) < needed:
+            break
+        # Noise and coherence were judged with the mismatch still in them: judge again, and let
+        # the best few compete in that null.
+        refitted: list[Fit] = []
+        for _ in range(2):
+            leader = (refitted or fits)[0]
+            whitener = searcher.whitener(leader.simulated)
+            pool = (refitted or fits)[:FINALISTS]
+            null = whitener
+            refitted = searcher.refit_all(null, [f.terms for f in pool])
+            refitted = [
+                refined_interval(searcher, null, f.terms[:-1], f)
+                if k < 2 and f.terms[-1].interval != ALWAYS
+                else f
+                for k, f in enumerate(sorted(refitted, key=_total))
+            ]
+            refitted.sort(key=_total)
+            if refitted[0].terms[-1].key == leader.terms[-1].key:
+                break
+        before = fit(whitener, searcher.station, fixed, searcher.bank.without) if fixed else (
+            _no_terms(whitener, searcher)
+        )
+        if _total(before) - _total(refitted[0]) < needed or not _large_enough(refitted[0]):
+            current = before
+            break
+        current = refitted[0]
+        losers = tuple(
+            Alternative(f, _total(f) - _total(current)) for f in refitted[1:]
+        )
+        alternatives = (*alternatives, *losers) if not first else losers
+    current, whitener = _pruned(searcher, whitener, current)
+    nothing = whitener.of(searcher.bank.without)
+    if progress:
+        progress(1.0)
+    return Naming(
+        current, whitener, nothing, float(nothing @ nothing) - current.cost, alternatives, screened
+    )
+
+
+def _pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> tuple[Fit, Whitener]:
+    """The fit without terms that later ones made superfluous."""
+    while len(current.terms) > 1:
+        without = [
+            fit(
+                whitener, searcher.station,
+                [t for j, t in enumerate(current.terms) if j != k], searcher.bank.without,
+            )
+            for k in range(len(current.terms))
+        ]  # fmt: skip
+        best = min(without, key=_total)
+        if _total(best) - _total(current) > ACCEPTED_GAIN and all(
+            t.relative_size >= SMALLEST_SIZE for t in current.terms
+        ):
+            break
+        current = best
+    return current, whitener

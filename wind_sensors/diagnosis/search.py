@@ -1,0 +1,185 @@
+"""Naming: the effects whose nonlinear fits explain the mismatch best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.fitting import Fit, Term, fit, planted
+from wind_sensors.diagnosis.screening import (
+    group_templates,
+    screen,
+    starting_values,
+)
+from wind_sensors.diagnosis.signatures import (
+    SignatureBank,
+    in_parallel,
+    signature_bank,
+    templates_of,
+)
+from wind_sensors.diagnosis.whitening import Whitener, trust_of, whitener_of
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+PENALTY_PER_PARAMETER = 3.0
+"""Cost of one more parameter, in units of the squared white vector."""
+
+PENALTY_PER_INTERVAL = 9.0
+"""Cost of a beginning or an end inside the record."""
+
+
+@dataclass
+class Searcher:
+    """The state of the search on one recording.
+
+    Attributes:
+        comparison: The recording.
+        baseline: What is normal.
+        bank: Signatures of the catalogue.
+        effects: The catalogue.
+        workers: Processes.
+    """
+
+    comparison: Comparison
+    baseline: Baseline
+    bank: SignatureBank
+    effects: Mapping[str, Effect]
+    guesses: Mapping[tuple[str, str], Sequence[Term]]
+    workers: int = 1
+
+    @property
+    def station(self) -> Station:
+        """The station as commissioned."""
+        return self.baseline.station
+
+    def whitener(self, simulated: Simulated) -> Whitener:
+        """The null seen from the best simulation so far."""
+        trust = trust_of(self.comparison, simulated, self.baseline)
+        return self._whitener(trust)
+
+    def _whitener(self, trust: Mapping[str, Trust]) -> Whitener:
+        templates = self.bank.templates
+        standing = np.array(
+            [
+                max(self.baseline.standing.get(t.key, 0.0), t.smallest_standing)
+                for t in templates
+            ]
+        )
+        means = np.array([self.baseline.means.get(t.key, 0.0) for t in templates])
+        signatures = self.bank.whitened(self.comparison, trust)
+        return whitener_of(self.comparison, trust, signatures, standing, means)
+
+    def white_signatures(self, whitener: Whitener) -> FloatArray:
+        """Signatures of the catalogue in a null."""
+        return whitener.through_standing(self.bank.whitened(self.comparison, whitener.trust))
+
+    def single_candidates(
+        self, whitener: Whitener, vector: FloatArray, number: int
+    ) -> list[list[Term]]:
+        """Starting points of the most promising effects, several for each."""
+        signatures = self.white_signatures(whitener)
+        scores = screen(self.bank.templates, signatures, vector)
+        groups = group_templates(self.bank.templates)
+        out: list[list[Term]] = []
+        for score in scores[:number]:
+            effect = self.effects[score.effect]
+            start = starting_values(score)
+            starts = [Term(effect, score.instrument, start)]
+            for parameter in effect.parameters:
+                starts.extend(
+                    Term(effect, score.instrument, {**start, parameter.name: value})
+                    for value in parameter.starts
+                )
+            members = groups[(score.effect, score.instrument)]
+            power = np.einsum("ij,ij->i", signatures[members], signatures[members])
+            seen = signatures[members] @ vector
+            gains = seen**2 / np.maximum(power, 1e-9)
+            if len(members) > 4:
+                order = np.argsort(-gains)[:3]
+                for k in order[1:]:
+                    template = self.bank.templates[members[int(k)]]
+                    amplitude = float(np.clip(seen[k] / max(power[k], 1e-9), 0.3, 10.0))
+                    values = dict(template.values)
+                    for p in effect.parameters:
+                        if p.healthy is not None:
+                            moved = p.healthy + amplitude * (values[p.name] - p.healthy)
+                            values[p.name] = float(np.clip(moved, p.low, p.high))
+                    starts.append(Term(effect, score.instrument, values))
+            out.append(starts)
+        chosen = {starts[0].key for starts in out}
+        for key, guesses in self.guesses.items():
+            if key in chosen:
+                next(s for s in out if s[0].key == key).extend(guesses)
+            else:
+                out.append(list(guesses))
+        return out
+
+    def best_fit(
+        self, whitener: Whitener, fixed: Sequence[Term], starts: Sequence[Term],
+        rest: Simulated | None,
+    ) -> Fit:
+        """Fit of known terms and one more, from the best of several starting points."""
+        comparison = self.comparison
+        ranked: list[tuple[float, int]] = []
+        for k, start in enumerate(starts):
+            station = planted(self.station, [*fixed, start])
+            only: tuple[str, ...] = ()
+            if rest is not None:
+                only = tuple(
+                    {
+                        n
+                        for t in [*fixed, start]
+                        for n in comparison.affected(self.station, t.instrument)
+                    }
+                )
+            vector = whitener.of(comparison.simulate(station, only, rest))
+            ranked.append((float(vector @ vector), k))
+        ranked.sort()
+        fits = [
+            fit(whitener, self.station, [*fixed, starts[k]], rest)
+            for _, k in ranked[: 2 if len(ranked) > 2 else 1]
+        ]
+        return min(fits, key=lambda f: f.cost)
+
+    def fit_all(
+        self, whitener: Whitener, fixed: Sequence[Term], candidates: Sequence[Sequence[Term]]
+    ) -> list[Fit]:
+        """Fits of the known terms with each candidate."""
+        rest = self.bank.without
+
+        def one(starts: Sequence[Term]) -> Fit:
+            return self.best_fit(whitener, fixed, starts, rest)
+
+        fits: list[Fit] = in_parallel(one, list(candidates), self.workers)
+        return fits
+
+    def refit_all(self, whitener: Whitener, explanations: Sequence[Sequence[Term]]) -> list[Fit]:
+        """Fits of whole explanations from where they are."""
+        rest = self.bank.without
+        fits: list[Fit] = in_parallel(
+            lambda terms: fit(whitener, self.station, terms, rest),
+            list(explanations),
+            self.workers,
+        )
+        return fits
+
+
+def searcher_of(
+    comparison: Comparison,
+    baseline: Baseline,
+    effects: Mapping[str, Effect],
+    guesses: Mapping[tuple[str, str], Sequence[Term]],
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Searcher:
+    """Prepare a search: simulate the catalogue in the recording's wind."""
+    templates = templates_of(comparison, baseline.station, effects)
+    bank = signature_bank(comparison, baseline.station, templates, workers, progress)
+    return Searcher(comparison, baseline, bank, effects, guesses, workers)

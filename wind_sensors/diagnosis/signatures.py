@@ -1,0 +1,183 @@
+"""Signatures: the simulation with an effect minus the simulation without it."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of, with_effect
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+SMALLEST_STANDING = 0.15
+"""Every effect is taken to be present on a healthy day with at least this share of the smallest
+size worth reporting."""
+
+_SECTOR_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class Template:
+    """An effect of one instrument at one set of values.
+
+    Attributes:
+        effect: The effect.
+        instrument: Name of the instrument, or `platform`.
+        number: Which of the effect's templates.
+        values: Parameters.
+    """
+
+    effect: Effect
+    instrument: str
+    number: int
+    values: Mapping[str, float]
+
+    @property
+    def key(self) -> str:
+        """Identifier in a baseline."""
+        return f"{self.effect.name}|{self.instrument}|{self.number}"
+
+    @property
+    def smallest_standing(self) -> float:
+        """Least standing size in units of the template; a bank of templates shares it."""
+        size = max(self.effect.relative_size(self.values), 0.5)
+        crowd = max(1.0, len(self.effect.templates) / 4.0)
+        return float(SMALLEST_STANDING / size / np.sqrt(crowd))
+
+    def planted(self, station: Station) -> Station:
+        """The station with the effect."""
+        return with_effect(station, self.effect, self.instrument, self.values)
+
+
+def entries(station: Station) -> Iterator[str]:
+    """Names of everything in a station that can have an effect."""
+    for instrument in station.instruments:
+        yield instrument.name
+    if station.platform is not None:
+        yield PLATFORM
+
+
+def _visited(comparison: Comparison, effect: Effect, values: Mapping[str, float]) -> bool:
+    """Whether the wind ever comes from where a directional template acts."""
+    width = values.get("width", 0.0)
+    if effect.name == "wake_shadow":
+        towards = values["bearing_from"]
+    elif effect.name == "potentiometer_gap":
+        towards = values["centre"]
+    else:
+        return True
+    away = np.angle(np.exp(1j * (comparison.wind_from - np.radians(towards))))
+    return bool(np.mean(np.abs(away) < np.radians(width)) > _SECTOR_SHARE)
+
+
+def templates_of(
+    comparison: Comparison, station: Station, effects: Mapping[str, Effect]
+) -> list[Template]:
+    """All templates that a recording of the station could show."""
+    compared = {c.instrument for c in comparison.channels} | {PLATFORM}
+    out = []
+    for name in entries(station):
+        if name not in compared:
+            continue
+        for effect in effects.values():
+            if not effect.applies(entry_of(station, name), station):
+                continue
+            out.extend(
+                Template(effect, name, number, values)
+                for number, values in enumerate(effect.templates)
+                if _visited(comparison, effect, values)
+            )
+    return out
+
+
+_task: tuple[Callable[[Any], Any], Sequence[Any]] | None = None
+
+
+def _run(index: int) -> Any:
+    assert _task is not None
+    return _task[0](_task[1][index])
+
+
+def in_parallel(
+    function: Callable[[Any], Any],
+    items: Sequence[Any],
+    workers: int,
+    progress: Callable[[float], None] | None = None,
+) -> list[Any]:
+    """Map over items in forked processes; the function and the items need no pickling.
+
+    Args:
+        function: Called with each item; its results are pickled.
+        items: Arguments.
+        workers: Number of processes; 1 stays in this one.
+        progress: Called with the share done.
+    """
+    global _task
+    out: list[Any] = []
+    if workers < 2 or len(items) < 4 or "fork" not in multiprocessing.get_all_start_methods():
+        for item in items:
+            out.append(function(item))
+            if progress:
+                progress(len(out) / len(items))
+        return out
+    _task = (function, items)
+    with multiprocessing.get_context("fork").Pool(workers) as pool:
+        for result in pool.imap(_run, range(len(items)), chunksize=2):
+            out.append(result)
+            if progress:
+                progress(len(out) / len(items))
+    _task = None
+    return out
+
+
+@dataclass(frozen=True)
+class SignatureBank:
+    """Simulations of all templates in one recording's wind.
+
+    Attributes:
+        templates: What was planted.
+        without: The simulation without any.
+        with_each: The simulations with each, in the order of `templates`.
+    """
+
+    templates: list[Template]
+    without: Simulated
+    with_each: list[Simulated]
+
+    def whitened(self, comparison: Comparison, trust: Mapping[str, Trust]) -> FloatArray:
+        """Noise-whitened signatures, one a row."""
+        nothing = comparison.vector(self.without, trust)
+        return np.array([nothing - comparison.vector(s, trust) for s in self.with_each])
+
+
+def signature_bank(
+    comparison: Comparison,
+    station: Station,
+    templates: list[Template],
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> SignatureBank:
+    """Simulate every template in a recording's wind."""
+    without = comparison.simulate(station)
+
+    def planted(template: Template) -> Simulated:
+        only = comparison.affected(station, template.instrument)
+        return comparison.simulate(template.planted(station), only=only)
+
+    parts = in_parallel(planted, templates, workers, progress)
+    with_each = [
+        Simulated(
+            {**without.cosine, **part.cosine},
+            {**without.series, **part.series},
+            {**without.statistics, **part.statistics},
+        )
+        for part in parts
+    ]
+    return SignatureBank(templates, without, with_each)
