@@ -39,6 +39,8 @@ from wind_sensors.station.signals import (
 
 STATION_FILE = "recording.yaml"
 BAG_FOLDER = "bag"
+WIND_TOPIC = "/wind"
+WIND_TYPE = "geometry_msgs/msg/TwistWithCovarianceStamped"
 Mask = npt.NDArray[np.bool_]
 
 
@@ -111,6 +113,27 @@ def read_series(path: str | Path, topic: str, field_name: str = "data") -> Serie
     found = _SignalReader(content, str(path)).series(source, "temperature")
     nothing = Series(np.empty(0, dtype=np.int64), np.empty(0))
     return nothing if found is None else found
+
+
+def read_estimates(path: str | Path) -> tuple[TimeArray, FloatArray, FloatArray] | None:
+    """The corrected wind in a processed recording.
+
+    Args:
+        path: Recording folder or bag.
+
+    Returns:
+        Time [ns], velocity east, north, up [m/s] of shape (n, 3) and the variance of each
+        component [m^2/s^2]; None where the recording has no topic `wind`.
+    """
+    content = read_bag(bag_of(Path(path)), lambda name: name == WIND_TOPIC)
+    data = content.topics.get(WIND_TOPIC)
+    if data is None or data.message_type != WIND_TYPE or not data.raw:
+        return None
+    paths: list[FieldPath] = [("twist", "twist", "linear", axis) for axis in ("x", "y", "z")]
+    paths += [("twist", "covariance", index) for index in (0, 7, 14)]
+    found = np.stack(columns(data.raw, content.types, WIND_TYPE, paths), axis=-1)
+    time = stamps(data.raw, content.types, WIND_TYPE, ("header", "stamp"))
+    return time, found[:, :3], found[:, 3:]
 
 
 def station_topics(station: Station) -> set[str]:

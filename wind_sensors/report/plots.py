@@ -1,0 +1,318 @@
+"""Figures of a recording: speed, direction, spectra, and the rotor's turn slot by slot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.signal import welch
+
+from wind_sensors.motion.frames import direction_from_deg, heading_of
+from wind_sensors.report import style
+from wind_sensors.station.model import Cup, Propeller
+from wind_sensors.station.signals import FloatArray, Pulses, Recording, TimeArray
+
+_ZOOM = 60.0
+"""Length of the detail in time series [s]."""
+_RATE = 10.0
+"""Of the grid for spectra [Hz]."""
+_NINETY_PERCENT = 1.6449
+
+
+class Estimates(NamedTuple):
+    """Corrected wind from a processed recording.
+
+    Attributes:
+        time: [ns], shape (n,).
+        velocity: East, north, up [m/s], shape (n, 3).
+        variance: Of each component [m^2/s^2], shape (n, 3).
+    """
+
+    time: TimeArray
+    velocity: FloatArray
+    variance: FloatArray
+
+
+def rotor_speed(rotor: Cup | Propeller, pulses: Pulses) -> tuple[TimeArray, FloatArray]:
+    """Speed by the calibration alone, revolution by revolution.
+
+    Returns:
+        Middle of each revolution [ns] and the speed [m/s]; where the source counts, of each
+        interval between counts.
+    """
+    time = np.sort(pulses.time)
+    if pulses.turns is None:
+        time = time[:: rotor.pulses_per_revolution]
+        turns = np.ones(max(len(time) - 1, 0))
+    else:
+        order = np.argsort(pulses.time, kind="stable")
+        turns = np.diff(pulses.turns[order])
+    seconds = np.diff(time) * 1e-9
+    good = seconds > 0.0
+    rate = 2.0 * np.pi * turns[good] / seconds[good]
+    offset = rotor.starting_speed if isinstance(rotor, Cup) else 0.0
+    middle = time[:-1][good] + np.diff(time)[good] // 2
+    return middle, rotor.calibration_distance * rate + offset
+
+
+def speed_figure(recording: Recording, estimates: Estimates | None) -> Figure | None:
+    """Wind speed over time: whole recording and a minute of it."""
+    lines: list[tuple[str, TimeArray, FloatArray, str]] = []
+    for index, (name, pulses) in enumerate(recording.pulses.items()):
+        rotor = recording.station.instrument(name)
+        if isinstance(rotor, (Cup, Propeller)) and len(pulses.time) > 2:
+            time, speed = rotor_speed(rotor, pulses)
+            colour = style.SERIES[(index + 1) % len(style.SERIES)]
+            lines.append((f"{name}, calibration only", time, speed, colour))
+    if recording.reference is not None:
+        winds = recording.reference
+        speed = np.hypot(winds.velocity[:, 0], winds.velocity[:, 1])
+        lines.insert(0, ("reference", winds.time, speed, style.REFERENCE))
+    if not lines and estimates is None:
+        return None
+    made, axes = style.figure(2)
+    apparent = recording.station.platform is not None
+    for panel, span in zip(axes, _spans(recording), strict=True):
+        step = 1.0 if span[1] - span[0] > 5.0 * _ZOOM else 0.0
+        for label, time, value, colour in lines:
+            seconds = _since(recording, time)
+            x, y = _thinned(seconds, value, span, step)
+            faint = label == "reference"
+            panel.plot(x, y, color=colour, lw=1.0 if faint else 1.2, label=label)
+        if estimates is not None:
+            _speed_band(panel, recording, estimates, span, step)
+        panel.set_ylabel("speed [m/s]")
+        panel.set_ylim(bottom=0.0)
+        panel.set_xlim(span)
+    title = "Wind speed" + (" (the rotor's is relative to the moving platform)" if apparent else "")
+    _finish(axes, title)
+    return made
+
+
+def direction_figure(recording: Recording, estimates: Estimates | None) -> Figure | None:
+    """Direction the wind comes from over time; a vane on a platform is turned by its attitude."""
+    lines: list[tuple[str, TimeArray, FloatArray, str]] = []
+    if recording.reference is not None:
+        winds = recording.reference
+        degrees = direction_from_deg(winds.velocity)
+        lines.append(("reference", winds.time, degrees, style.REFERENCE))
+    for index, (name, angles) in enumerate(recording.angles.items()):
+        if name.endswith("/elevation") or not len(angles.time):
+            continue
+        heading = angles.angle + _sensor_heading(recording, angles.time)
+        degrees = np.mod(90.0 - np.degrees(heading), 360.0)
+        colour = style.SERIES[(index + 1) % len(style.SERIES)]
+        lines.append((f"{name}, as read", angles.time, degrees, colour))
+    if estimates is not None:
+        degrees = direction_from_deg(estimates.velocity)
+        lines.append(("corrected", estimates.time, degrees, style.CORRECTED))
+    if not lines:
+        return None
+    middle = _circular_mean(lines[0][2])
+    made, axes = style.figure(2)
+    for panel, span in zip(axes, _spans(recording), strict=True):
+        for label, time, value, colour in lines:
+            around = middle + np.mod(value - middle + 180.0, 360.0) - 180.0
+            seconds = _since(recording, time)
+            x, y = _thinned(seconds, around, span, 1.0 if span[1] - span[0] > 5 * _ZOOM else 0.0)
+            panel.plot(x, y, color=colour, lw=1.0, label=label)
+        panel.yaxis.set_major_formatter(lambda degrees, _: f"{degrees % 360.0:.0f}\N{DEGREE SIGN}")
+        panel.set_ylabel("from, clockwise from north")
+        panel.set_xlim(span)
+    _finish(axes, "Direction the wind comes from")
+    return made
+
+
+def spectra_figure(recording: Recording, estimates: Estimates | None) -> Figure | None:
+    """Frequency times spectral density of the speed, with the inertial subrange's slope."""
+    series: list[tuple[str, TimeArray, FloatArray, str]] = []
+    if recording.reference is not None:
+        winds = recording.reference
+        speed = np.hypot(winds.velocity[:, 0], winds.velocity[:, 1])
+        series.append(("reference", winds.time, speed, style.REFERENCE))
+    for index, (name, pulses) in enumerate(recording.pulses.items()):
+        rotor = recording.station.instrument(name)
+        if isinstance(rotor, (Cup, Propeller)) and len(pulses.time) > 100:
+            colour = style.SERIES[(index + 1) % len(style.SERIES)]
+            series.append((name, *rotor_speed(rotor, pulses), colour))
+    if estimates is not None:
+        speed = np.hypot(estimates.velocity[:, 0], estimates.velocity[:, 1])
+        series.append(("corrected", estimates.time, speed, style.CORRECTED))
+    made, (panel,) = style.figure(1, 4.4)
+    drawn = 0
+    top = 0.0
+    for label, time, value, colour in series:
+        if len(time) < 64 or int(time[-1]) - int(time[0]) < 60_000_000_000:
+            continue
+        interval = max(1.0 / _RATE, float(np.median(np.diff(time))) * 1e-9)
+        frequency, density = _spectrum(time, value, interval)
+        panel.loglog(frequency, frequency * density, color=colour, label=label)
+        top = max(top, float(np.max(frequency * density)))
+        drawn += 1
+    if not drawn:
+        return None
+    line = np.asarray([0.05, 2.0])
+    panel.loglog(line, top * (line / 0.05) ** (-2.0 / 3.0), color=style.MUTED, ls="--", lw=1.0)
+    panel.annotate("slope -2/3", (0.3, top * 6.0 ** (-2.0 / 3.0)), (4, 5), color=style.MUTED,
+                   textcoords="offset points")  # fmt: skip
+    panel.set_ylim(top * 1e-4, top * 2.0)
+    panel.set_xlabel("frequency [Hz]")
+    panel.set_ylabel("frequency x spectral density [m\u00b2/s\u00b2]")
+    panel.set_title("Spectra of the speed")
+    panel.legend(loc="lower left")
+    return made
+
+
+def phase_figure(recording: Recording) -> Figure | None:
+    """Duration of each slot of the rotor relative to its own revolution."""
+    rotors: list[tuple[str, Cup | Propeller, Pulses]] = []
+    for name, pulses in recording.pulses.items():
+        rotor = recording.station.instrument(name)
+        if not isinstance(rotor, (Cup, Propeller)) or rotor.pulses_per_revolution < 2:
+            continue
+        if pulses.turns is None and len(pulses.time) > 200:
+            rotors.append((name, rotor, pulses))
+    if not rotors:
+        return None
+    made, axes = style.figure(len(rotors), 3.0)
+    for panel, (name, rotor, pulses) in zip(axes, rotors, strict=True):
+        slots, mean, error = slot_durations(pulses, rotor.pulses_per_revolution)
+        panel.axhline(0.0, color=style.MUTED, lw=1.0)
+        panel.errorbar(slots + 1, 100.0 * mean, 100.0 * _NINETY_PERCENT * error, fmt="o",
+                       color=style.CORRECTED, ms=5, capsize=3)  # fmt: skip
+        panel.set_xticks(slots + 1)
+        panel.set_xlabel("slot of the turn")
+        panel.set_ylabel("longer than average [%]")
+        panel.set_title(f"{name}: slot by slot, with 90 % intervals")
+        reach = max(1.0, 1.3 * float(np.max(np.abs(100.0 * mean) + 100.0 * 2.0 * error)))
+        panel.set_ylim(-reach, reach)
+    return made
+
+
+def slot_durations(
+    pulses: Pulses, pulses_per_revolution: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """How much longer each slot lasts than the average of the turn around it.
+
+    Returns:
+        Slot numbers, mean relative excess and its standard error, shape (slots,) each. The first
+        slot is the one that the first edge opens; a lost edge shifts the numbers from there on.
+    """
+    count = pulses_per_revolution
+    duration = np.diff(np.sort(pulses.time)).astype(np.float64) * 1e-9
+    turn = np.convolve(duration, np.ones(count), mode="valid") / count
+    first = (count - 1) // 2
+    inside = duration[first : first + len(turn)]
+    usable = turn > 0.0
+    excess = np.where(usable, inside / np.where(usable, turn, 1.0) - 1.0, 0.0)
+    slot = (np.arange(len(turn)) + first) % count
+    calm = usable & (np.abs(excess) < 0.5)
+    mean, error = np.zeros(count), np.zeros(count)
+    for number in range(count):
+        mine = excess[calm & (slot == number)]
+        if len(mine) > 1:
+            mean[number] = mine.mean()
+            error[number] = mine.std(ddof=1) / np.sqrt(len(mine))
+    return np.arange(count, dtype=np.float64), mean, error
+
+
+FIGURES: dict[str, Callable[[Recording, Estimates | None], Figure | None]] = {
+    "speed": speed_figure,
+    "direction": direction_figure,
+    "spectra": spectra_figure,
+    "phase": lambda recording, estimates: phase_figure(recording),
+}
+"""Every figure by name."""
+
+
+def draw(name: str, recording: Recording, estimates: Estimates | None) -> Figure | None:
+    """One of `FIGURES`; None where the recording has nothing for it."""
+    with style.house():
+        return FIGURES[name](recording, estimates)
+
+
+def _sensor_heading(recording: Recording, time: TimeArray) -> FloatArray | float:
+    """Heading of the sensor's x axis, counter-clockwise from east [rad]."""
+    if recording.platform is None:
+        return float(np.radians(recording.station.sensor_heading_deg))
+    states = recording.platform
+    yaw = np.unwrap(heading_of(states.attitude))
+    return np.interp(time - recording.start, states.time - recording.start, yaw)
+
+
+def _since(recording: Recording, time: TimeArray) -> FloatArray:
+    """Seconds since the start of the recording."""
+    return np.asarray((time - recording.start) * 1e-9, dtype=np.float64)
+
+
+def _spans(recording: Recording) -> list[tuple[float, float]]:
+    """The whole recording and a minute in its middle [s]."""
+    length = (recording.stop - recording.start) * 1e-9
+    start = max(0.5 * (length - _ZOOM), 0.0)
+    return [(0.0, length), (start, min(start + _ZOOM, length))]
+
+
+def _thinned(
+    x: FloatArray, y: FloatArray, span: tuple[float, float], step: float
+) -> tuple[FloatArray, FloatArray]:
+    """The part in the span; with a step, means over it."""
+    inside = (x >= span[0]) & (x <= span[1])
+    x, y = x[inside], y[inside]
+    if step <= 0.0 or len(x) < 2:
+        return x, y
+    bins = ((x - span[0]) / step).astype(np.int64)
+    count = np.bincount(bins)
+    used = count > 0
+    middle = np.asarray(span[0] + (np.flatnonzero(used) + 0.5) * step, dtype=np.float64)
+    return middle, np.bincount(bins, weights=y)[used] / count[used]
+
+
+def _speed_band(
+    panel: Axes,
+    recording: Recording,
+    estimates: Estimates,
+    span: tuple[float, float],
+    step: float,
+) -> None:
+    speed = np.hypot(estimates.velocity[:, 0], estimates.velocity[:, 1])
+    safe = np.maximum(speed, 1e-6)
+    unit = estimates.velocity[:, :2] / safe[:, None]
+    deviation = np.sqrt(np.sum(unit**2 * estimates.variance[:, :2], axis=1))
+    seconds = _since(recording, estimates.time)
+    x, middle = _thinned(seconds, speed, span, step)
+    panel.plot(x, middle, color=style.CORRECTED, label="corrected")
+    if step <= 0.0:
+        _, half = _thinned(seconds, _NINETY_PERCENT * deviation, span, step)
+        panel.fill_between(x, middle - half, middle + half, color=style.CORRECTED, alpha=0.2,
+                           lw=0, label="90 % interval")  # fmt: skip
+
+
+def _finish(axes: list[Axes], title: str) -> None:
+    axes[0].set_title(title)
+    axes[1].set_title("a minute of it", fontsize=9.5, fontweight="normal")
+    axes[-1].set_xlabel("time since the start [s]")
+    axes[1].legend(loc="upper right", ncols=4, bbox_to_anchor=(1.0, 1.16), columnspacing=1.2)
+
+
+def _spectrum(time: TimeArray, value: FloatArray, interval: float) -> tuple[FloatArray, FloatArray]:
+    """Welch spectrum, averaged in bins of equal width on the logarithmic axis."""
+    seconds = (time - time[0]) * 1e-9
+    grid = np.arange(0.0, seconds[-1], interval)
+    order = np.argsort(seconds, kind="stable")
+    even = np.interp(grid, seconds[order], value[order])
+    segment = int(min(len(even), max(256, len(even) // 4)))
+    frequency, density = welch(even, 1.0 / interval, nperseg=segment)
+    frequency, density = frequency[1:], density[1:]
+    bins = np.floor(np.log10(frequency / frequency[0]) * 12.0).astype(np.int64)
+    count = np.bincount(bins)
+    used = count > 0
+    smooth = [np.bincount(bins, weights=part)[used] / count[used] for part in (frequency, density)]
+    return smooth[0], smooth[1]
+
+
+def _circular_mean(degrees: FloatArray) -> float:
+    radians = np.radians(degrees[np.isfinite(degrees)])
+    return float(np.degrees(np.arctan2(np.sin(radians).mean(), np.cos(radians).mean())))
