@@ -23,7 +23,7 @@ class MinimumSize:
 
 MINIMUM_SIZES: dict[str, MinimumSize] = {
     "wake_shadow": MinimumSize(0.06, "1", "loss of speed in the middle of the wake"),
-    "flow_distortion": MinimumSize(0.015, "1", "largest change of speed with direction"),
+    "flow_distortion": MinimumSize(0.02, "1", "largest change of speed with direction"),
     "axis_tilt": MinimumSize(6.0, "deg", "lean of the sensor's axis"),
     "platform_velocity": MinimumSize(
         1.0, "1", "share of the platform's velocity missing from its odometry", "B", False
@@ -34,11 +34,11 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     "frame_error": MinimumSize(8.0, "deg", "turn of the velocity's frame", "B"),
     "rotor_downwash": MinimumSize(0.8, "m/s", "downward jet in a calm", "B"),
     "calibration_drift": MinimumSize(0.01, "1", "change of the indicated speed"),
-    "calibration_offset": MinimumSize(0.08, "m/s", "loss of speed at every wind"),
-    "bearing_friction": MinimumSize(0.06, "m/s", "loss of speed at 5 m/s"),
+    "calibration_offset": MinimumSize(0.12, "m/s", "loss of speed at every wind"),
+    "bearing_friction": MinimumSize(0.12, "m/s", "loss of speed at 5 m/s"),
     "air_density": MinimumSize(0.12, "1", "logarithm of the loss of density"),
     "rotor_inertia": MinimumSize(0.5, "1", "growth of the moment of inertia"),
-    "torque_asymmetry": MinimumSize(0.2, "1", "growth of the torque while speeding up"),
+    "torque_asymmetry": MinimumSize(0.25, "1", "growth of the torque while speeding up"),
     "damaged_cup": MinimumSize(0.03, "1", "loss of force on one cup or blade"),
     "angular_response": MinimumSize(0.12, "1", "change of the response to a tilted wind"),
     "icing": MinimumSize(0.012, "1", "loss of speed by ice, with the mass that goes with it"),
@@ -46,7 +46,7 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
         0.25, "m", "error of the propeller's distance from the vane's axis", "C"
     ),
     "vane_friction": MinimumSize(1.5, "deg", "angle at which the vane sticks at 5 m/s"),
-    "vane_inertia": MinimumSize(0.5, "1", "growth of the vane's moment of inertia"),
+    "vane_inertia": MinimumSize(0.4, "1", "growth of the vane's moment of inertia"),
     "vane_damping": MinimumSize(0.5, "1", "growth of the damping ratio at 8 m/s"),
     "vane_imbalance": MinimumSize(1.2, "deg", "error of the vane at 5 m/s on a leaning axis"),
     "missed_pulses": MinimumSize(0.01, "1", "share of the pulses lost"),
@@ -56,10 +56,10 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     "vane_eccentricity": MinimumSize(1.0, "deg", "error of the vane once a turn"),
     "potentiometer_gap": MinimumSize(4.0, "deg", "width of the vane's dead gap"),
     "quantisation": MinimumSize(2.0, "deg", "step of the vane's reading"),
-    "low_pass_filter": MinimumSize(0.2, "s", "time constant of the vane's electronics"),
+    "low_pass_filter": MinimumSize(0.12, "s", "time constant of the vane's electronics"),
     "stuck_sensor": MinimumSize(20.0, "s", "time for which a signal stands still"),
-    "timestamp_latency": MinimumSize(0.12, "s", "delay of the stamps"),
-    "clock_drift": MinimumSize(0.4, "s", "error of the stamps at the end of the record"),
+    "timestamp_latency": MinimumSize(0.1, "s", "delay of the stamps"),
+    "clock_drift": MinimumSize(0.25, "s", "error of the stamps at the end of the record"),
 }
 
 

@@ -128,8 +128,9 @@ def rotor_inertia(scene: Scene, amount: float, activity: Array) -> Parameters:
 
 def torque_asymmetry(scene: Scene, amount: float, activity: Array) -> Parameters:
     """Flexible cups or blades that open while speeding up and fold while slowing down."""
-    scene.rotor.opening[:] += activity * amount
-    return {"asymmetry": round(amount, 4)}
+    opening = min(amount, 0.9)
+    scene.rotor.opening[:] += activity * opening
+    return {"asymmetry": round(opening, 4)}
 
 
 def damaged_cup(scene: Scene, amount: float, activity: Array) -> Parameters:

@@ -12,6 +12,7 @@ from proving_ground.tunnel import vane_sheet
 
 FRICTION_SPEED = 5.0
 LEAN = np.radians(4.0)
+TYPICAL_ROLL = np.radians(12.0)
 
 
 def stiffness(scene: Scene, speed: float) -> float:
@@ -49,7 +50,7 @@ def vane_damping(scene: Scene, amount: float, activity: Array) -> Parameters:
 
 def vane_imbalance(scene: Scene, amount: float, activity: Array) -> Parameters:
     """A counterweight lost; a mast also leans, for on an upright axis nothing would show."""
-    lean = LEAN
+    lean = LEAN if scene.station.boat is None else TYPICAL_ROLL
     moment = stiffness(scene, FRICTION_SPEED) * float(np.radians(amount)) / (9.81 * np.sin(lean))
     scene.vane.imbalance[:] += activity * moment
     if scene.station.boat is None:
