@@ -73,3 +73,27 @@ def test_wind_vector_from_two_angles() -> None:
     assert np.linalg.norm(vector) == pytest.approx(6.0)
     assert math.atan2(vector[1], vector[0]) == pytest.approx(0.4)
     assert vector[2] == pytest.approx(6.0 * math.sin(-0.2))
+
+
+@pytest.mark.parametrize("half_width", [1, 3, 6])
+def test_wider_differences_are_exact_for_their_polynomials(half_width: int) -> None:
+    first, second = bivane.difference_weights(half_width)
+    k = np.arange(1, half_width + 1)
+    for degree in range(1, 2 * half_width + 1):
+        slope = float(np.sum(first * (k.astype(float) ** degree - (-k.astype(float)) ** degree)))
+        bend = float(np.sum(second * (k.astype(float) ** degree + (-k.astype(float)) ** degree)))
+        assert slope == pytest.approx(1.0 if degree == 1 else 0.0, abs=1e-8)
+        assert bend == pytest.approx(2.0 if degree == 2 else 0.0, abs=1e-8)
+    with pytest.raises(ValueError, match="one sample"):
+        bivane.difference_weights(0)
+
+
+def test_wider_differences_reach_closer_to_the_nyquist_frequency() -> None:
+    sampling = bivane.reduced_sampling(RUN, SPEED, 0.5)
+    width = bivane.half_width_for(0.8, sampling, ZETA, 0.048)
+    assert 2 <= width <= 16
+    frequency = np.linspace(0.0, 0.8, 100) * math.pi / sampling
+    worst = np.max(np.abs(bivane.overall_gain(frequency, sampling, ZETA, width) - 1.0))
+    plain = np.max(np.abs(bivane.overall_gain(frequency, sampling, ZETA) - 1.0))
+    assert worst < 0.05
+    assert plain > 0.3

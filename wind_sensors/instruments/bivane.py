@@ -81,6 +81,7 @@ def reduce_samples(
     interval: float,
     free_wind_run: float,
     damping_ratio: float,
+    half_width: int = 1,
     printed_form: bool = False,
 ) -> FloatArray:
     """W [m/s] from sampled angles by central differences; M66 (6) with L^2 in the last term.
@@ -91,10 +92,13 @@ def reduce_samples(
         interval: dt [s].
         free_wind_run: L [m].
         damping_ratio: zeta.
+        half_width: Samples used on each side; 1 is M66's (6), more keep the gain right closer to
+            the Nyquist frequency.
         printed_form: Use L instead of L^2 as the paper prints, to show that it fails.
 
     Returns:
-        Shape (n,); NaN at both ends, where no difference exists, and where V is not positive.
+        Shape (n,); NaN where a difference would reach beyond the ends, and where V is not
+        positive.
     """
     beta = np.asarray(angle, dtype=np.float64)
     v = np.broadcast_to(_positive(speed), beta.shape)
@@ -103,15 +107,45 @@ def reduce_samples(
     if printed_form:
         curvature = free_wind_run / (4.0 * math.pi**2)
     out = np.full(beta.shape, np.nan)
-    middle = beta[1:-1]
-    slope = (beta[2:] - beta[:-2]) / (2.0 * interval)
-    bend = (beta[2:] + beta[:-2] - 2.0 * middle) / (interval * interval)
-    out[1:-1] = v[1:-1] * middle + 2.0 * damping_ratio * length * slope + curvature / v[1:-1] * bend
+    inner = slice(half_width, beta.size - half_width)
+    middle = beta[inner]
+    slope = np.zeros_like(middle)
+    bend = np.zeros_like(middle)
+    for k, (first, second) in enumerate(zip(*difference_weights(half_width), strict=True), 1):
+        ahead = beta[half_width + k : beta.size - half_width + k]
+        behind = beta[half_width - k : beta.size - half_width - k]
+        slope += first * (ahead - behind) / interval
+        bend += second * (ahead + behind - 2.0 * middle) / interval**2
+    v = v[inner]
+    out[inner] = v * middle + 2.0 * damping_ratio * length * slope + curvature / v * bend
     return out
 
 
+def difference_weights(half_width: int) -> tuple[FloatArray, FloatArray]:
+    """Weights of the widest-order central differences, shape (half_width,) each.
+
+    beta' = sum_k first_k (beta_k - beta_-k)/dt, beta'' = sum_k second_k (beta_k + beta_-k -
+    2 beta_0)/dt^2, exact for polynomials of degree 2 half_width + 1.
+
+    Raises:
+        ValueError: If the half width is below one.
+    """
+    if half_width < 1:
+        raise ValueError("a central difference needs at least one sample on each side")
+    m = half_width
+    first = [
+        (-1) ** (k + 1)
+        * math.factorial(m) ** 2
+        / (k * math.factorial(m - k) * math.factorial(m + k))
+        for k in range(1, m + 1)
+    ]
+    orders = np.arange(1, m + 1)
+    slopes = np.array(first)
+    return slopes, 2.0 * slopes / orders
+
+
 def correction_gain(
-    frequency: npt.ArrayLike, sampling: float, damping_ratio: float
+    frequency: npt.ArrayLike, sampling: float, damping_ratio: float, half_width: int = 1
 ) -> ComplexArray:
     """Complex gain R of the discrete reduction (derived).
 
@@ -119,16 +153,46 @@ def correction_gain(
         frequency: omega/omega0 [1].
         sampling: omega0 dt [1].
         damping_ratio: zeta.
+        half_width: As in `reduce_samples`.
     """
     turn = np.asarray(frequency, dtype=np.float64) * sampling
-    bend = (2.0 * np.sin(0.5 * turn) / sampling) ** 2
-    return np.asarray(1.0 - bend + 2j * damping_ratio * np.sin(turn) / sampling)
+    slope = np.zeros_like(turn)
+    bend = np.zeros_like(turn)
+    for k, (first, second) in enumerate(zip(*difference_weights(half_width), strict=True), 1):
+        slope = slope + 2.0 * first * np.sin(k * turn)
+        bend = bend + 4.0 * second * np.sin(0.5 * k * turn) ** 2
+    return np.asarray(1.0 - bend / sampling**2 + 2j * damping_ratio * slope / sampling)
 
 
-def overall_gain(frequency: npt.ArrayLike, sampling: float, damping_ratio: float) -> FloatArray:
+def overall_gain(
+    frequency: npt.ArrayLike, sampling: float, damping_ratio: float, half_width: int = 1
+) -> FloatArray:
     """|H R| [1] of bivane and reduction together. Arguments as in `correction_gain`."""
     response = transfer_function(frequency, damping_ratio)
-    return np.asarray(np.abs(response * correction_gain(frequency, sampling, damping_ratio)))
+    gain = correction_gain(frequency, sampling, damping_ratio, half_width)
+    return np.asarray(np.abs(response * gain))
+
+
+def half_width_for(
+    nyquist_share: float, sampling: float, damping_ratio: float, tolerance: float
+) -> int:
+    """Smallest half width whose overall gain stays right up to a share of the Nyquist frequency.
+
+    Args:
+        nyquist_share: Share of the Nyquist frequency, below 1.
+        sampling: omega0 dt [1].
+        damping_ratio: zeta.
+        tolerance: Largest error of |H R|.
+
+    Raises:
+        ValueError: If no half width up to 30 samples serves.
+    """
+    frequency = np.linspace(0.0, nyquist_share, 200) * math.pi / sampling
+    for half_width in range(1, 31):
+        gain = overall_gain(frequency, sampling, damping_ratio, half_width)
+        if np.max(np.abs(gain - 1.0)) <= tolerance:
+            return half_width
+    raise ValueError("no difference formula reaches that close to the Nyquist frequency")
 
 
 def nyquist_gain(sampling: float) -> float:

@@ -45,6 +45,16 @@ def longitudinal_loss_small(reduced_length: npt.ArrayLike) -> FloatArray:
     return SMALL_ARGUMENT_COEFFICIENT * y ** (2.0 / 3.0)
 
 
+def transverse_loss_as_printed(reduced_length: npt.ArrayLike) -> FloatArray:
+    """phi_T [1] with the denominator printed in K14 (106), 18 (1 - y^2) instead of its square.
+
+    To show what the misprint does: .528 for .555 at y = 0.5, and negative beyond y = 4.
+    """
+    y = np.asarray(reduced_length, dtype=np.float64)
+    longitudinal = longitudinal_loss(y)
+    return longitudinal + (transverse_loss(y) - longitudinal) * (1.0 - y * y)
+
+
 def exponential_loss(length_ratio: npt.ArrayLike) -> FloatArray:
     """Loss for the correlation exp(-r/L): l0/(l0 + L) [1] (Busch and Kristensen's form).
 

@@ -104,6 +104,27 @@ def recovered_fraction(slope: float = INERTIAL_SLOPE) -> float:
     return (slope - 1.0) / (3.0 - slope) * edge**4 * float(integral)
 
 
+def recovered_fraction_as_printed(slope: float = INERTIAL_SLOPE) -> float:
+    """D(beta) [1] with the integration limit printed in K94 (81), to show what it does.
+
+    Args:
+        slope: beta, between 1 and 3.
+
+    Raises:
+        ValueError: If beta is out of range.
+    """
+    _check_slope(slope)
+    zeta = damping_without_loss(slope)
+    edge = crossing_as_printed(slope)
+
+    # s = edge/t maps the infinite range to (0, 1).
+    def integrand(t: float) -> float:
+        return (1.0 - 1.0 / float(inverse_gain_squared(edge / t, zeta))) * math.pow(t, slope - 2.0)
+
+    integral, _ = integrate.quad(integrand, 0.0, 1.0, limit=800, epsabs=1e-12, epsrel=1e-10)
+    return (slope - 1.0) * float(integral)
+
+
 def inertial_loss(
     distance_constant: float, damping_ratio: float, dissipation: float, alpha_1: float
 ) -> float:
