@@ -24,7 +24,7 @@ from wind_sensors.station.parameters import rotor_parameters, vane_parameters
 
 FloatArray = npt.NDArray[np.float64]
 
-LARGEST_TURN_PER_NODE = 0.5
+LARGEST_TURN_PER_NODE = 1.0
 """Turn of a rotor with a once-per-revolution torque between two of its results [rad]."""
 
 
@@ -229,9 +229,9 @@ def _nodes(stretches: tuple[Stretch, ...], drive: Drive, wanted: tuple[str, ...]
         for name in wanted:
             rotor = stretch.segment.station.instrument(name)
             if isinstance(rotor, Rotor) and rotor.torque_harmonic > 0.0:
-                speed = float(np.abs(drive.wind).max()) * 1.5 * rotor.calibration_gain
+                speed = float(np.linalg.norm(drive.wind, axis=1).max()) * rotor.calibration_gain
                 if drive.motion is not None:
-                    speed += float(np.abs(drive.motion.velocity).max())
+                    speed += float(np.linalg.norm(drive.motion.velocity, axis=1).max())
                 turn = drive.dt * speed / rotor.calibration_distance
                 nodes[name] = max(nodes[name], int(np.ceil(turn / LARGEST_TURN_PER_NODE)))
     return nodes
