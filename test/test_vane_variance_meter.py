@@ -12,12 +12,12 @@ from wind_sensors.instruments.dynamics.vane import VaneParameters, integrate_van
 from wind_sensors.turbulence import von_karman
 from wind_sensors.turbulence.synthesis import TurbulenceSpec, TurbulenceStream
 
-SPEED, LENGTH, RATE = 6.0, 0.5, 60.0
+SPEED, LENGTH, RATE = 6.0, 0.5, 100.0
 
 
 def seen_and_true(integral_length: float, zeta: float, seed: int) -> tuple[float, float]:
     """Variance of the vane's angle [rad^2] and of the lateral wind [m^2/s^2]."""
-    sigma = 0.05 * SPEED
+    sigma = 0.02 * SPEED
     spec = TurbulenceSpec(
         mean_speed=SPEED,
         standard_deviations=(sigma, sigma, sigma),
