@@ -139,3 +139,17 @@ def test_a_rotor_that_stops_has_no_smooth_periodic_rate() -> None:
         periodic_rate(
             lambda theta: 1.0 + 0.9 * np.sin(theta), 1.0, 0.02, lambda theta: 0.0 * theta - 0.3
         )
+
+
+@pytest.mark.parametrize("a4", [0.0, 0.3, 0.77, 1.0, 1.09])
+def test_forcing_is_recovered_from_rate_and_acceleration(a4: float) -> None:
+    generator = np.random.default_rng(5)
+    y = generator.uniform(1.0, 12.0, 3000)
+    forcing = y * generator.uniform(0.6, 1.8, 3000)
+    lift = generator.uniform(-0.05, 0.05, 3000)
+    rate = ((forcing - y) * (a4 * forcing + (1.0 - a4) * y) + lift) / 1.7
+    inverse = rotor_family.forcing_from_rate(y, rate, a4, 1.7, lift)
+    assert np.all(inverse.possible)
+    assert np.allclose(inverse.value, forcing, rtol=1e-10)
+    if a4 > 0.0:
+        assert not bool(rotor_family.forcing_from_rate(1.0, -50.0, a4, 1.7).possible)

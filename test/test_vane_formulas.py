@@ -155,3 +155,14 @@ def test_undamped_vane_and_slopes_out_of_range_are_refused() -> None:
         vane_variance.g_integral(0.0)
     with pytest.raises(ValueError, match="slope"):
         vane_variance.h_integral(0.5, 3.0)
+
+
+def test_wind_angle_inverts_the_vane() -> None:
+    """A vane driven by a sine wind: its angle and derivatives give the wind back."""
+    omega0, zeta, omega = 5.0, 0.4, 7.0
+    response = complex(vane.transfer_function(omega / omega0, zeta))
+    time = np.linspace(0.0, 3.0, 50)
+    wave = 0.1 * response * np.exp(1j * omega * time)
+    angle, rate, bend = np.imag(wave), np.imag(1j * omega * wave), np.imag(-(omega**2) * wave)
+    found = vane.wind_angle(angle, rate, bend, omega0, zeta)
+    assert np.allclose(found, 0.1 * np.sin(omega * time), atol=1e-14)

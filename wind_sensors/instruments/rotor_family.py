@@ -165,3 +165,41 @@ def steady_rate(forcing: npt.ArrayLike, lift: npt.ArrayLike, a4: float) -> Float
         if a4 <= 0.5:
             return (middle + root) / (2.0 * (1.0 - a4))
         return 2.0 * (a4 * a * a + e) / (root - middle)
+
+
+class ForcingInversion(NamedTuple):
+    """Forcing A recovered from a rotor's rate and acceleration.
+
+    Attributes:
+        value: A [m/s], the root that a rotor near equilibrium has.
+        possible: Whether the equation has a root at all; where it has not (noise, or a loss of
+            rate faster than any wind explains) `value` is the nearest one.
+    """
+
+    value: FloatArray
+    possible: npt.NDArray[np.bool_]
+
+
+def forcing_from_rate(
+    indicated: npt.ArrayLike,
+    indicated_rate: npt.ArrayLike,
+    a4: float,
+    distance_constant: float,
+    lift: npt.ArrayLike = 0.0,
+) -> ForcingInversion:
+    """A [m/s] from l0 dy/dt = (A - y)[a4 A + (1 - a4) y] + E, the rotor equation solved for A.
+
+    Args:
+        indicated: y = l s [m/s], positive.
+        indicated_rate: dy/dt [m/s^2].
+        a4: Share of the torque's slope that follows the wind.
+        distance_constant: l0 [m].
+        lift: E [m^2/s^2].
+    """
+    y = np.asarray(indicated, dtype=np.float64)
+    excess = distance_constant * np.asarray(indicated_rate, dtype=np.float64) - np.asarray(lift)
+    bracket = y * y + 4.0 * a4 * excess
+    root = np.sqrt(np.maximum(bracket, 0.0))
+    # The form with the root in the denominator holds for a4 = 0 as well.
+    value = y + 2.0 * excess / (y + root)
+    return ForcingInversion(value, bracket >= 0.0)

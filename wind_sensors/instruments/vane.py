@@ -169,3 +169,23 @@ def slow_pole_length_ratio(damping_ratio: float) -> float:
 def effective_length(dynamics: VaneDynamics) -> float:
     """l_eff = 2 zeta l_v [m]; K94 (47), for zeta much larger than 1."""
     return 2.0 * dynamics.damping_ratio * dynamics.distance_constant
+
+
+def wind_angle(
+    angle: npt.ArrayLike,
+    rate: npt.ArrayLike,
+    acceleration: npt.ArrayLike,
+    natural_frequency: npt.ArrayLike,
+    damping_ratio: float,
+) -> FloatArray:
+    """alpha = phi + 2 zeta phi'/omega0 + phi''/omega0^2 [rad]: K94 (39) solved for the wind.
+
+    Args:
+        angle, rate, acceleration: phi [rad] and its derivatives [rad/s], [rad/s^2].
+        natural_frequency: omega0 = U/l_v [rad/s].
+        damping_ratio: zeta.
+    """
+    omega = np.asarray(natural_frequency, dtype=np.float64)
+    turning = 2.0 * damping_ratio * np.asarray(rate, dtype=np.float64) / omega
+    bend = np.asarray(acceleration, dtype=np.float64) / (omega * omega)
+    return np.asarray(angle, dtype=np.float64) + turning + bend
