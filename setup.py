@@ -43,7 +43,7 @@ setup(
     version="0.1.0",
     description="Corrected wind from cups, propellers and vanes, on masts and on robots.",
     license="Apache-2.0",
-    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    packages=find_packages(include=[NAME, f"{NAME}.*", "proving_ground", "proving_ground.*"]),
     package_data={NAME: ["py.typed", "**/*.html", "**/*.css"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -58,7 +58,7 @@ setup(
         "ros": ROS_WHEELS,
         "test": ["pytest>=7.0", "hypothesis>=6.70"],
         "dev": ["mypy>=1.10", "ruff>=0.6", "scipy-stubs"],
-        "peers": ["pysindy>=1.7", "sysidentpy>=0.3", "scikit-learn>=1.3"],
+        "peers": ["pysindy>=2.0", "sysidentpy>=0.9", "scikit-learn>=1.3"],
     },
     zip_safe=False,
     entry_points={

@@ -47,6 +47,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     opened.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     opened.add_argument("--force", action="store_true", help="write over an earlier score")
 
+    peers = steps.add_parser("peers", help="other methods on the recordings of an opened set")
+    peers.add_argument("folder", type=Path, metavar="DIR")
+    peers.add_argument("--key", required=True, metavar="FILE|HEX")
+    peers.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
+    peers.add_argument("--jobs", type=_positive, default=1)
+
     demo = steps.add_parser("demo", help="one case from sealing to opening in two minutes")
     demo.add_argument("-o", "--output", type=Path, default=Path("prove_demo"), metavar="DIR")
     demo.add_argument("--seed", type=int, default=7)
@@ -57,7 +63,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Run one step; 0 on success, 1 where `open` finds a promise broken."""
-    steps = {"seal": _seal, "run": _run, "open": _open, "demo": _demo}
+    steps = {"seal": _seal, "run": _run, "open": _open, "peers": _peers, "demo": _demo}
     return steps[arguments.step](arguments)
 
 
@@ -117,6 +123,17 @@ def _open(arguments: argparse.Namespace) -> int:
     _print_rates(rates)
     print(f"wrote {output}")
     return int(any(rate.met is False for rate in rates))
+
+
+def _peers(arguments: argparse.Namespace) -> int:
+    from proving_ground.peers.table import compare, write_table
+    from proving_ground.sealing.opening import judge_all, open_answers
+
+    answers = open_answers(arguments.folder, _read_key(arguments.key))
+    judged = judge_all(arguments.folder, answers)
+    rows = compare(arguments.folder, answers, judged, arguments.jobs)
+    print(f"wrote {write_table(arguments.output or arguments.folder / 'score', rows)}")
+    return 0
 
 
 def _demo(arguments: argparse.Namespace) -> int:

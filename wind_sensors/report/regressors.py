@@ -1,0 +1,65 @@
+"""Residuals and signatures of a recording as plain arrays, for other methods to regress on.
+
+`python -m wind_sensors.report.regressors RECORDING -o FILE.npz` writes what `wind diagnose` itself
+sees in the time domain, before any baseline: the peers of the proving ground start from it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from wind_sensors.diagnosis.comparison import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.signatures import signature_bank, templates_of
+from wind_sensors.errors import UserError
+from wind_sensors.recordings import read_recording
+
+
+def write_regressors(recording: Path, target: Path, workers: int = 1) -> None:
+    """Write the regressors of a recording.
+
+    The file holds `residual` (n) [m/s], recorded minus simulated, of all channels one after the
+    other; `signatures` (n, m), simulated with minus without each template; `effects` (m) their
+    names; `sizes` (m) in units of the smallest worth reporting; `channel` (n) which channel.
+
+    Raises:
+        UserError: The recording cannot be read or compared.
+    """
+    comparison = prepare(read_recording(recording))
+    station = comparison.station
+    templates = templates_of(comparison, station, catalogue())
+    bank = signature_bank(comparison, station, templates, workers)
+    names = [c.name for c in comparison.channels]
+    measured = np.concatenate([comparison.measured.series[n] for n in names])
+    without = np.concatenate([bank.without.series[n] for n in names])
+    with_each = [np.concatenate([s.series[n] for n in names]) for s in bank.with_each]
+    np.savez_compressed(
+        target,
+        residual=measured - without,
+        signatures=np.stack(with_each, axis=1) - without[:, None],
+        effects=np.array([t.effect.name for t in templates]),
+        sizes=np.array([t.effect.relative_size(t.values) for t in templates]),
+        channel=np.repeat(np.arange(len(names)), comparison.grid.n),
+    )
+
+
+def main() -> int:
+    """Write the regressors of one recording; 0 on success, 2 for a recording that cannot be."""
+    parser = argparse.ArgumentParser(prog="python -m wind_sensors.report.regressors")
+    parser.add_argument("recording", type=Path, metavar="RECORDING")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE")
+    options = parser.parse_args()
+    try:
+        write_regressors(options.recording, options.output)
+    except UserError as problem:
+        print(problem, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
