@@ -22,8 +22,8 @@ from wind_sensors.instruments.dynamics.rotor import (
     PROPELLER_JACKSON,
     PROPELLER_KRISTENSEN_1994,
     RotorParameters,
-    integrate_cup,
 )
+from wind_sensors.instruments.dynamics.rotor_record import integrate_cup
 from wind_sensors.instruments.dynamics.vane import VaneParameters, integrate_propeller_vane
 from wind_sensors.instruments.propeller_vane import bias_weight, relative_wind
 from wind_sensors.report.monte_carlo_cases import Case, standard_cases

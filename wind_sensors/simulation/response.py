@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
-from wind_sensors.instruments.dynamics.rotor import cup_axes, integrate_rotor
+from wind_sensors.instruments.dynamics.rotor_record import cup_axes, integrate_rotor
 from wind_sensors.instruments.dynamics.vane import integrate_vane, propeller_vane_axes
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.wind_at_sensor import Flow, WindAtSensors

@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
-from wind_sensors.instruments.dynamics.rotor import RotorParameters, integrate_rotor
+from wind_sensors.instruments.dynamics.rotor import RotorParameters
+from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
 
 FloatArray = npt.NDArray[np.float64]
 
