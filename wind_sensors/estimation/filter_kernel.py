@@ -41,6 +41,13 @@ FloatArray = npt.NDArray[np.float64]
 
 _PROCESSES = len(TIME_CONSTANTS)
 _VERTICAL = len(VERTICAL_CONSTANTS)
+_MODEL_ERROR = 0.003
+"""Standard deviation of the forcing relative to the wind (radians for a vane), over a time of
+response."""
+_CALM = 0.3
+"""[m/s]"""
+_RARE = 7.0
+"""Log of the odds against a lost or an extra edge before any was seen."""
 _FAR_OUT = 5.0
 """Innovations beyond this many standard deviations are cut back to it."""
 
@@ -154,20 +161,20 @@ def overspeeding(
         phi, air_turn: Heading of the carrying vane and its turning against the air.
         unresolved: Variance of each component faster than any process of the state.
     """
-    a_0, b_0 = forcing_of(s, rotor, wind, c, phi, air_turn)
     size = max(math.hypot(wind[0] - c[0], wind[1] - c[1]), 0.5)
     e = (wind[0] - c[0]) / size
     n = (wind[1] - c[1]) / size
     moved = np.empty(3)
-    gradient = np.empty(3)
+    gradient = np.zeros(3)
     curvature = 0.0
-    for k in range(3):
+    a_0, b_0 = 0.0, 0.0
+    for k in range(-1, 3):
         along_e, along_n, along_u = 0.0, 0.0, 0.0
         if k == 0:
             along_e, along_n = e, n
         elif k == 1:
             along_e, along_n = -n, e
-        else:
+        elif k == 2:
             along_u = 1.0
         variance = (
             along_e * along_e * spread[0, 0]
@@ -177,19 +184,24 @@ def overspeeding(
             + unresolved
         )
         delta = min(math.sqrt(max(variance, 1e-8)), 0.5 * size)
-        moved[0] = wind[0] + delta * along_e
-        moved[1] = wind[1] + delta * along_n
-        moved[2] = wind[2] + delta * along_u
-        ahead, _ = forcing_of(s, rotor, moved, c, phi, air_turn)
-        moved[0] = wind[0] - delta * along_e
-        moved[1] = wind[1] - delta * along_n
-        moved[2] = wind[2] - delta * along_u
-        behind, _ = forcing_of(s, rotor, moved, c, phi, air_turn)
-        curvature += 0.5 * (ahead + behind - 2.0 * a_0)
-        slope = (ahead - behind) / (2.0 * delta)
-        gradient[0] = slope * along_e if k == 0 else gradient[0] + slope * along_e
-        gradient[1] = slope * along_n if k == 0 else gradient[1] + slope * along_n
-        gradient[2] = slope * along_u if k == 0 else gradient[2] + slope * along_u
+        ahead = 0.0
+        for side in range(2):
+            sign = 0.0 if k < 0 else (delta if side == 0 else -delta)
+            moved[0] = wind[0] + sign * along_e
+            moved[1] = wind[1] + sign * along_n
+            moved[2] = wind[2] + sign * along_u
+            a, b = forcing_of(s, rotor, moved, c, phi, air_turn)
+            if k < 0:
+                a_0, b_0 = a, b
+                break
+            if side == 0:
+                ahead = a
+                continue
+            curvature += 0.5 * (ahead + a - 2.0 * a_0)
+            slope = (ahead - a) / (2.0 * delta)
+            gradient[0] += slope * along_e
+            gradient[1] += slope * along_n
+            gradient[2] += slope * along_u
     forcing_variance = 0.0
     with_forcing = 0.0
     for i in range(3):
@@ -251,9 +263,13 @@ def predict(
     by_wind_0 = np.empty((count, 3))
     by_wind_1 = ring.noise_gain[slot]
     by_state = np.empty((count, count))
+    reach = np.empty(3)
+    for a in range(3):
+        reach[a] = min(max(math.sqrt(max(spread[a, a], 0.0)), 1e-3), 1.0)
     advance_with_jacobian(
-        s, wind_0, wind_1, f.circumstances, c, state, dt, out, by_wind_0, by_wind_1, by_state
-    )
+        s, wind_0, wind_1, f.circumstances, c, state, dt, reach, out, by_wind_0, by_wind_1,
+        by_state,
+    )  # fmt: skip
     for i in range(rotors):
         out[2 * i] += dt * extra[i]
         out[2 * i + 1] += 0.5 * dt * dt * extra[i] / s.rotor[i, 1]
@@ -266,8 +282,25 @@ def predict(
         for k in range(count):
             transition[r, w + k] = by_state[r, k]
     _move_covariance(f.covariance, decay, transition, by_wind_1, noise)
+    _add_model_noise(f.covariance, s, math.hypot(wind_1[0] - c[0], wind_1[1] - c[1]), dt)
     f.circumstances[:] = c
     ring.moved[slot] = 1
+
+
+@compiled
+def _add_model_noise(p: FloatArray, s: Instruments, speed: float, dt: float) -> None:
+    """What the equations of motion leave out: torques of a small share of the wind's."""
+    rotors = s.rotor.shape[0]
+    for i in range(rotors):
+        length = s.rotor[i, 3] * s.rotor[i, 12]
+        h = max(speed, _CALM)
+        p[WIND_STATES + 2 * i, WIND_STATES + 2 * i] += (
+            2.0 * dt * _MODEL_ERROR * _MODEL_ERROR * h * h * h / length
+        )
+    for v in range(s.vane.shape[0]):
+        j = WIND_STATES + 2 * (rotors + v) + 1
+        omega = max(speed, _CALM) / s.vane[v, 0]
+        p[j, j] += 2.0 * dt * _MODEL_ERROR * _MODEL_ERROR * omega * omega * omega
 
 
 @compiled
@@ -394,8 +427,12 @@ def _note(f: FilterState, which: int, squared: float) -> None:
 
 
 @compiled
-def correct_by_edge(f: FilterState, s: Instruments, ring: Ring, slot: int, r: int) -> None:
-    """An edge of rotor r at the state's time, the number of lost edges resolved."""
+def correct_by_edge(f: FilterState, ring: Ring, slot: int, r: int, time: int) -> None:
+    """An edge of rotor r at a time [ns], the number of lost edges resolved.
+
+    Edges were lost (or came extra) when the filter says so and the interval has grown (or shrunk)
+    as much: no rotor changes so quickly by itself.
+    """
     measured = WIND_STATES + 2 * r + 1
     width = 2.0 * math.pi / f.slots[r]
     number = f.edge_count[r]
@@ -404,6 +441,19 @@ def correct_by_edge(f: FilterState, s: Instruments, ring: Ring, slot: int, r: in
     off = (expected - f.mean[measured]) / width
     spread = math.sqrt(f.covariance[measured, measured]) / width
     lost = -math.floor(off + 0.5)
+    interval = (time - f.last_used[r]) * 1e-9 / f.stride[r]
+    even = (1.0 + 0.5 * lost / f.stride[r]) * f.slot_interval[r]
+    if (lost > 0 and interval < even) or (lost < 0 and interval > even):
+        lost = 0
+    if f.slot_interval[r] == 0.0:
+        lost = 0
+    if lost != 0:
+        # An edge too many or too few is rare: the evidence must outweigh that.
+        share = (f.tally[r, 1] + f.tally[r, 2] + 0.5) / (f.tally[r, 0] + 1.0)
+        doubt = min(max(-math.log(share), 1.0), _RARE)
+        gained = 0.5 * (off * off - (off + lost) * (off + lost))
+        if gained < doubt * (spread * spread + f.edge_variance[r]):
+            lost = 0
     if lost != 0:
         number += lost
         f.edge_count[r] = number
@@ -413,9 +463,11 @@ def correct_by_edge(f: FilterState, s: Instruments, ring: Ring, slot: int, r: in
             f.tally[r, 2] -= lost
         place = int(number % f.slots[r])
         expected = (number + f.slot_error[r, place]) * width
-        f.rejected[r] += 1
+    if f.last_used[r] > 0:
+        f.slot_interval[r] = interval * f.stride[r] / max(f.stride[r] + lost, 1)
+    f.last_used[r] = time
     innovation = expected - f.mean[measured]
-    variance = (f.edge_variance[r] + min(spread, 1.0) ** 4) * width * width
+    variance = f.edge_variance[r] * width * width
     squared = correct(f, ring, slot, measured, innovation, variance)
     ring.kind[slot] = EDGE
     ring.which[slot] = r

@@ -39,6 +39,8 @@ class FilterState(NamedTuple):
         slot_error: Place of each edge against an even division [slots], shape (rotors, 64).
         slot_score, slot_information: Running scores of `slot_error`.
         last_edge: Time of the last accepted edge of each rotor [ns].
+        last_used: Time of the last edge that corrected the filter [ns].
+        slot_interval: Time per slot before that edge, lost edges counted [s]; 0 before the first.
         edge_count: Edges since the start, lost ones included.
         rejected: Consecutive rejections of each rotor.
         tally: By rotor: accepted, lost, extra, found again; shape (rotors, 4).
@@ -63,6 +65,8 @@ class FilterState(NamedTuple):
     slot_score: FloatArray
     slot_information: FloatArray
     last_edge: IntArray
+    last_used: IntArray
+    slot_interval: FloatArray
     edge_count: IntArray
     rejected: IntArray
     tally: IntArray
@@ -130,6 +134,8 @@ def empty_filter(rotors: int, vanes: int) -> FilterState:
         slot_score=np.zeros((rotors, LARGEST_SLOTS)),
         slot_information=np.zeros((rotors, LARGEST_SLOTS)),
         last_edge=np.zeros(rotors, dtype=np.int64),
+        last_used=np.zeros(rotors, dtype=np.int64),
+        slot_interval=np.zeros(rotors),
         edge_count=np.zeros(rotors, dtype=np.int64),
         rejected=np.zeros(rotors, dtype=np.int64),
         tally=np.zeros((rotors, 4), dtype=np.int64),

@@ -218,44 +218,61 @@ def advance_with_jacobian(
     c_1: FloatArray,
     state: FloatArray,
     dt: float,
+    reach: FloatArray,
     out: FloatArray,
     by_wind_0: FloatArray,
     by_wind_1: FloatArray,
     by_state: FloatArray,
 ) -> None:
-    """`advance_station` and its derivatives by forward differences.
+    """`advance_station` and its derivatives.
+
+    Those by the wind are differences over the wind's own uncertainty, so that a rotor below its
+    starting speed or a vane in a calm still learns from what the wind may do (statistical
+    linearisation).
 
     Args:
+        reach: Half widths of those differences [m/s], shape (3,).
         by_wind_0, by_wind_1: Filled with d out / d wind, shape (states, 3) each.
         by_state: Filled with d out / d state, shape (states, states).
     """
     count = state.shape[0]
-    advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, out)
-    moved = np.empty(count)
-    step = 1e-4
-    for k in range(3):
-        keep = wind_0[k]
-        wind_0[k] = keep + step
-        advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, moved)
-        wind_0[k] = keep
-        for j in range(count):
-            by_wind_0[j, k] = (moved[j] - out[j]) / step
-        keep = wind_1[k]
-        wind_1[k] = keep + step
-        advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, moved)
-        wind_1[k] = keep
-        for j in range(count):
-            by_wind_1[j, k] = (moved[j] - out[j]) / step
     rotors = s.rotor.shape[0]
-    for k in range(count):
-        if k < 2 * rotors and k % 2 == 1 and s.rotor[k // 2, 13] == 0.0:
+    tried = np.empty((3, count))
+    inputs = np.empty(6 + count)
+    inputs[0:3] = wind_0
+    inputs[3:6] = wind_1
+    inputs[6:] = state
+    small = 1e-4
+    # One call in one loop: the compiler then keeps a single copy of the equations.
+    for k in range(-1, 12 + count):
+        which = k // 2 if k < 12 else k - 6
+        keep = inputs[which] if k >= 0 else 0.0
+        if k >= 12:
+            r = k - 12
+            if r < 2 * rotors and r % 2 == 1 and s.rotor[r // 2, 13] == 0.0:
+                continue
+            inputs[which] = keep + small
+        elif k >= 0:
+            inputs[which] = keep + (reach[which % 3] if k % 2 == 0 else -reach[which % 3])
+        advance_station(
+            s, inputs[0:3], inputs[3:6], c_0, c_1, inputs[6:], dt, tried[0] if k < 0 else tried[1]
+        )
+        if k < 0:
             for j in range(count):
-                by_state[j, k] = 0.0
-            by_state[k, k] = 1.0
+                out[j] = tried[0, j]
             continue
-        keep = state[k]
-        state[k] = keep + step
-        advance_station(s, wind_0, wind_1, c_0, c_1, state, dt, moved)
-        state[k] = keep
+        inputs[which] = keep
         for j in range(count):
-            by_state[j, k] = (moved[j] - out[j]) / step
+            if k >= 12:
+                by_state[j, k - 12] = (tried[1, j] - out[j]) / small
+            elif k % 2 == 0:
+                tried[2, j] = tried[1, j]
+            elif which < 3:
+                by_wind_0[j, which] = (tried[2, j] - tried[1, j]) / (2.0 * reach[which])
+            else:
+                by_wind_1[j, which - 3] = (tried[2, j] - tried[1, j]) / (2.0 * reach[which - 3])
+    for i in range(rotors):
+        if s.rotor[i, 13] == 0.0:
+            for j in range(count):
+                by_state[j, 2 * i + 1] = 0.0
+            by_state[2 * i + 1, 2 * i + 1] = 1.0

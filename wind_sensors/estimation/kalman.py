@@ -11,6 +11,7 @@ from wind_sensors.estimation import forward
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
 from wind_sensors.estimation.constants import instruments_of, rotors_of, vanes_of
 from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
+from wind_sensors.estimation.filter_kernel import wind_of
 from wind_sensors.estimation.filter_state import (
     EDGE,
     LARGEST_SLOTS,
@@ -31,7 +32,7 @@ from wind_sensors.estimation.readings import headings
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.smoother_kernel import smooth
 from wind_sensors.estimation.start import start_filter
-from wind_sensors.estimation.turbulence_process import UNRESOLVED_VARIANCE
+from wind_sensors.estimation.turbulence_process import UNRESOLVED_VARIANCE, WIND_STATES
 from wind_sensors.station.changes import Segment, segments
 from wind_sensors.station.model import Cup, Propeller, Station, Vane
 
@@ -40,6 +41,11 @@ IntArray = npt.NDArray[np.int64]
 
 _WARM_UP_NS = 2_000_000_000
 _LONGEST_WARM_UP_NS = 10_000_000_000
+_PATIENCE_NS = 2_000_000_000
+_TAIL_WIND = -0.3
+"""Share of the wind that blows onto the nose; below this it blows onto the tail."""
+_CALM = 0.5
+"""Below this speed any vane may point anywhere [m/s]."""
 _FINEST_WIND_RUN = 0.125
 """Edges closer than this share of the distance constant carry nothing new and are not used."""
 
@@ -99,6 +105,7 @@ class KalmanCore:
         self._waiting: list[Block] = []
         self._started = False
         self.restarts = 0
+        self._tail_wind = 0
 
     def _enter(self, station: Station) -> None:
         """Use the constants of a stretch of time in which the station does not change."""
@@ -200,17 +207,37 @@ class KalmanCore:
             events.value, events.extra, rows, block.stop, self._block, self._lag, self._weight,
             out.time, out.states, out.covariance, out.circumstances,
         )  # fmt: skip
-        if not np.isfinite(self.filter.mean).all():
+        if not np.isfinite(self.filter.mean).all() or self._is_astray():
             self._start_again(block)
             return no_estimates()
         return self._delivered(out, filled)
 
+    def _is_astray(self) -> bool:
+        """Whether the wind has blown onto a vane's tail for some blocks.
+
+        The equations hold there too, but no vane stays so: the filter has lost the wind.
+        """
+        f = self.filter
+        rotation = f.circumstances[forward.MOUNT_ROTATION : forward.MOUNT_ROTATION + 9]
+        felt = rotation.reshape(3, 3).T @ (self.wind - f.circumstances[:3])
+        size = float(np.hypot(felt[0], felt[1]))
+        for i in range(len(self._vanes)):
+            phi = f.mean[WIND_STATES + 2 * (len(self._rotors) + i)]
+            onto_nose = -(felt[0] * np.cos(phi) + felt[1] * np.sin(phi))
+            if onto_nose < _TAIL_WIND * size and size > _CALM:
+                self._tail_wind += 1
+                return self._tail_wind * self._block > _PATIENCE_NS
+        self._tail_wind = 0
+        return False
+
     def _start_again(self, block: Block) -> None:
         """A filter that broke down begins anew with the next blocks; it says so in its health."""
         self.restarts += 1
+        self._tail_wind = 0
         rotors, vanes = len(self._rotors), len(self._vanes)
         fresh = empty_filter(rotors, vanes)
         fresh.slots[:] = self.filter.slots
+        fresh.height[:] = self.filter.height
         fresh.stride[:] = self.filter.stride
         self.filter = fresh
         self._ring = empty_ring(64, rotors, vanes)
@@ -277,8 +304,6 @@ class KalmanCore:
 
 
 def _total(mean: FloatArray) -> FloatArray:
-    from wind_sensors.estimation.filter_kernel import wind_of
-
     out = np.empty(3)
     wind_of(mean, out)
     return out
@@ -288,8 +313,6 @@ class _Room:
     """Arrays that receive estimates."""
 
     def __init__(self, count: int, states: int) -> None:
-        from wind_sensors.estimation.turbulence_process import WIND_STATES
-
         size = 3 + states - WIND_STATES
         self.time = np.zeros(count, dtype=np.int64)
         self.states = np.zeros((count, size))

@@ -25,21 +25,29 @@ IntArray = npt.NDArray[np.int64]
 
 _LOSS_NOTICED = 0.002
 """Share of lost edges from which silence no longer means that the rotor waits."""
-_IN_A_ROW = 3
-"""So many rejected edges in a row are not extra edges: the rotor is faster than believed."""
+_TOO_EARLY = 0.4
+"""An edge that comes after less than this share of a slot, by the last interval and by what is
+known of the rate, is an extra one."""
 
 
 @compiled
 def is_extra_edge(f: FilterState, s: Instruments, r: int, time: int) -> bool:
     """Whether an edge comes before the rotor can have turned half a slot."""
-    if f.tally[r, 0] == 0 or f.rejected[r] >= _IN_A_ROW:
-        return False
     since = (time - f.last_edge[r]) * 1e-9
+    if since > _TOO_EARLY * f.slot_interval[r]:
+        return False
     width = 2.0 * math.pi / f.slots[r]
     y = WIND_STATES + 2 * r
     turned = f.mean[y] * since / (s.rotor[r, 1] * width)
     unsure = math.sqrt(f.covariance[y, y]) * since / (s.rotor[r, 1] * width)
-    return bool(turned + 3.0 * unsure < 0.5)
+    return bool(turned + 3.0 * unsure < _TOO_EARLY)
+
+
+@compiled
+def _doubt_rate(f: FilterState, r: int) -> None:
+    """Widen what is known about the rate of rotor r, which edges have contradicted."""
+    y = WIND_STATES + 2 * r
+    f.covariance[y, y] += (0.3 * f.mean[y] + 0.3) ** 2
 
 
 @compiled
@@ -101,10 +109,15 @@ def run(
         which = index[i]
         if this == EDGE:
             if is_extra_edge(f, s, which, time[i]):
-                f.tally[which, 2] += 1
-                f.rejected[which] += 1
-                i += 1
-                continue
+                if f.rejected[which] == 0:
+                    f.tally[which, 2] += 1
+                    f.rejected[which] = 1
+                    i += 1
+                    continue
+                # Two in a row were no extra edges: the rotor is faster than believed.
+                f.tally[which, 2] -= 1
+                f.edge_count[which] += 1
+                _doubt_rate(f, which)
             f.tally[which, 0] += 1
             f.rejected[which] = 0
             f.edge_count[which] += 1
@@ -126,7 +139,7 @@ def run(
         if this == READING:
             correct_by_reading(f, s, ring, at, which, value[i], extra[i])
         elif this == EDGE:
-            correct_by_edge(f, s, ring, at, which)
+            correct_by_edge(f, ring, at, which, time[i])
         elif this == TURNS:
             f.tally[which, 0] += 1
             f.stride[which] = 0

@@ -26,6 +26,8 @@ IntArray = npt.NDArray[np.int64]
 _START_BLOCKS = 30.0
 """The first blocks move the levels faster than later ones."""
 _LARGEST_MOVE = 0.3
+_STRONGEST = 2.0 / 60.0 ** (2.0 / 3.0)
+"""Highest level over the speed squared: a turbulence intensity of one within a minute."""
 _EDGE_LIMITS = (1e-4**2, 0.3**2)
 _READING_LIMITS = (math.radians(0.01) ** 2, math.radians(6.0) ** 2)
 
@@ -308,13 +310,17 @@ def _follow(
     noise_expected: FloatArray,
 ) -> None:
     """Move turbulence levels, noise variances and slot places towards their likeliest values."""
+    speed = max(math.hypot(f.mean[2 * PAIRS - 2], f.mean[2 * PAIRS - 1]), 1.0)
+    for r in range(rotors):
+        speed = max(speed, f.mean[WIND_STATES + 2 * r])
+    highest = _STRONGEST * speed * speed
     for g in range(LEVELS):
         if expected[g] <= 0.0:
             continue
         old = f.level_information[g]
         f.level_information[g] = old + weight * (expected[g] - old) if old > 0.0 else expected[g]
         level = _moved(f.levels[g], score[g], expected[g], f.level_information[g], weight)
-        f.levels[g] = min(max(level, 1e-6), 1e3)
+        f.levels[g] = min(max(level, 1e-6), highest)
     for i in range(noise_score.shape[0]):
         if noise_expected[i] <= 0.0:
             continue
