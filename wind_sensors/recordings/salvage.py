@@ -164,6 +164,8 @@ def _salvage_sqlite(path: Path) -> Salvage:
     nothing = MessageDefinition(MessageDefinitionFormat.NONE, "")
     try:
         with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as database:
+            # Without this a file shorter than its header says is refused before it is read.
+            database.execute("PRAGMA writable_schema = ON")
             topics = {
                 key: (name, kind)
                 for key, name, kind in database.execute("SELECT id, name, type FROM topics")

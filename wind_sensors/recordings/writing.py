@@ -16,6 +16,7 @@ from wind_sensors.recordings.estimate_topics import estimate_topics
 from wind_sensors.recordings.raw_topics import raw_topics
 from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.serialising import TopicMessages
+from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.writing import station_to_yaml
 
@@ -49,7 +50,8 @@ def write_recording(
     types = typestore()
     topics = raw_topics(recording, types)
     topics += outputs if isinstance(outputs, Sequence) else estimate_topics(outputs, types)
-    return write_topics(folder, station_to_yaml(recording.station), topics, force=force)
+    text = station_to_yaml(recording.station, shipped_profiles())
+    return write_topics(folder, text, topics, force=force)
 
 
 def write_topics(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from io import StringIO
 from typing import Any
 
@@ -10,50 +11,61 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedSeq
 
 from wind_sensors.station.model import Input, Instrument, Station
+from wind_sensors.station.profiles import Profile
 
 
-def station_to_yaml(station: Station) -> str:
+def station_to_yaml(station: Station, profiles: Mapping[str, Profile] | None = None) -> str:
     """The station file that reads back as this station.
 
-    Only keys that differ from their default are written. An instrument with a profile keeps every
-    key that was given, because leaving one out would bring the profile's value back.
+    Only keys that differ from their default are written, and the constants of a profile that an
+    instrument names, because leaving one out would bring the profile's value back.
+
+    Args:
+        station: The station.
+        profiles: Profiles that the instruments name; without them every key that an instrument
+            was given is written.
     """
     stream = StringIO()
     writer = YAML()
     writer.width = 100
-    writer.dump(_entry(station), stream)
+    writer.dump(_entry(station, profiles), stream)
     return stream.getvalue()
 
 
-def _entry(entry: BaseModel) -> Any:
-    if isinstance(entry, Input) and _given(entry) == {"topic"}:
+def _entry(entry: BaseModel, profiles: Mapping[str, Profile] | None) -> Any:
+    keys = _given(entry, profiles)
+    if isinstance(entry, Input) and keys == {"topic"}:
         return entry.topic
-    keys = _given(entry)
     names = list(type(entry).model_fields)
     names.sort(key=lambda name: {"name": 0, "kind": 1, "profile": 2}.get(name, 3))
-    return {name: _plain(getattr(entry, name)) for name in names if name in keys}
+    return {name: _plain(getattr(entry, name), profiles) for name in names if name in keys}
 
 
-def _given(entry: BaseModel) -> set[str]:
+def _given(entry: BaseModel, profiles: Mapping[str, Profile] | None) -> set[str]:
     """Keys that must be written."""
-    if isinstance(entry, Instrument) and entry.profile:
-        return set(entry.model_fields_set) | {"kind", "name", "profile"}
     fields = type(entry).model_fields
     given = {
         name
         for name, field in fields.items()
         if field.is_required() or getattr(entry, name) != field.get_default()
     }
-    return given | ({"kind"} if isinstance(entry, Instrument) else set())
+    if isinstance(entry, Instrument):
+        given.add("kind")
+        profile = (profiles or {}).get(entry.profile)
+        if profile is not None:
+            given |= set(profile.constants)
+        elif entry.profile:
+            given |= entry.model_fields_set
+    return given
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, profiles: Mapping[str, Profile] | None) -> Any:
     if isinstance(value, BaseModel):
-        return _entry(value)
+        return _entry(value, profiles)
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _plain(item, profiles) for key, item in value.items()}
     if isinstance(value, (tuple, list)):
-        items = CommentedSeq(_plain(item) for item in value)
+        items = CommentedSeq(_plain(item, profiles) for item in value)
         if not any(isinstance(item, dict) for item in items):
             items.fa.set_flow_style()
         return items
