@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.observation import HARMONICS, NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.observation import HARMONICS, NORMALISED_BANDS, STILLNESS, Channel
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,13 +22,14 @@ _BANDS = len(NORMALISED_BANDS) - 1
 _SPECTRUM_PRIOR = 0.22
 _SHARE_PRIOR = 0.003
 _AMPLITUDE_PRIOR = 0.012
+_STILLNESS_PRIOR = 0.12
 
 
 def statistics_prior(channel: Channel) -> FloatArray:
     """Standard deviations expected of a channel's statistics before any healthy recording."""
     bands = np.full(_BANDS, _SPECTRUM_PRIOR)
     if channel.kind == "vane_angle":
-        return bands
+        return np.concatenate((bands, np.full(STILLNESS, _STILLNESS_PRIOR)))
     return np.concatenate(
         (bands, np.full(2, _SHARE_PRIOR), np.full(2 * HARMONICS, _AMPLITUDE_PRIOR))
     )

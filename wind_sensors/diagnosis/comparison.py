@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.effects.definition import PLATFORM
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.observation import (
     HARMONICS,
     LOWEST_BAND_FREQUENCY,
@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.observation import (
     channels_of,
     interval_statistics,
     rate_series,
+    stillness_statistics,
 )
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import Drive, drive_from_recording
@@ -131,7 +132,7 @@ class Comparison:
 
     def affected(self, station: Station, instrument: str) -> tuple[str, ...]:
         """Instruments whose signals depend on a change of one entry of the station."""
-        if instrument == PLATFORM:
+        if instrument in (PLATFORM, STATION):
             return tuple(c.instrument for c in self.channels)
         carried = tuple(
             i.name
@@ -201,7 +202,12 @@ class Comparison:
                 deviation = angle_series(readings, self.direction, self.grid)
                 values = deviation * self.speed
                 full = spectra.to_cosine(values)
-                statistics[channel.name] = self._vane_spectrum(readings, channel)
+                statistics[channel.name] = np.concatenate(
+                    (
+                        self._vane_spectrum(readings, channel),
+                        stillness_statistics(deviation + self.direction, self.speed),
+                    )
+                )
             series[channel.name] = values
             cosine[channel.name] = full[: self.coefficients]
         return Simulated(cosine, series, statistics)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
 from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -142,6 +143,15 @@ class Problem:
         simulated = self.simulate(values)
         return self._whitener.of(simulated), simulated
 
+    def trial(self, values: FloatArray) -> tuple[float, FloatArray, Simulated | None]:
+        """Cost, white vector and simulation; an infinite cost where the station is impossible."""
+        try:
+            vector, simulated = self.vector(values)
+        except (UserError, ValueError):
+            return np.inf, np.zeros(0), None
+        cost = float(vector @ vector)
+        return (cost if np.isfinite(cost) else np.inf), vector, simulated
+
     def jacobian(
         self, values: FloatArray, base: FloatArray, low: FloatArray, high: FloatArray
     ) -> FloatArray:
@@ -154,7 +164,11 @@ class Problem:
             moved = values.copy()
             moved[k] = min(max(values[k] + step, low[k]), high[k])
             shift = (moved[k] - values[k]) / parameter.difference
-            columns.append((self.vector(moved)[0] - base) / (shift if shift else 1.0))
+            cost, vector, _ = self.trial(moved)
+            if not np.isfinite(cost) or shift == 0.0:
+                columns.append(np.zeros_like(base))
+            else:
+                columns.append((vector - base) / shift)
         return np.array(columns).T
 
 
@@ -180,8 +194,13 @@ def fit(
     high = np.array([p.high for p in parameters])
     scale = np.array([p.difference for p in parameters])
     values = np.clip(values_of(terms), low, high)
-    vector, simulated = problem.vector(values)
-    cost = float(vector @ vector)
+    cost, vector, first = problem.trial(values)
+    if first is None:
+        values = np.array([p.healthy if p.healthy is not None else 0.5 * (p.low + p.high)
+                           for p in parameters])
+        vector, first = problem.vector(values)
+        cost = float(vector @ vector)
+    simulated = first
     damping = 1e-2
     normal = np.eye(len(values))
     for _ in range(iterations):
@@ -194,9 +213,8 @@ def fit(
             weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
             step = -np.linalg.solve(weighted, gradient) * scale
             trial = np.clip(values + step, low, high)
-            trial_vector, trial_simulated = problem.vector(trial)
-            trial_cost = float(trial_vector @ trial_vector)
-            if trial_cost < cost:
+            trial_cost, trial_vector, trial_simulated = problem.trial(trial)
+            if trial_simulated is not None and trial_cost < cost:
                 gained = cost - trial_cost
                 values, vector, simulated, cost = (
                     trial, trial_vector, trial_simulated, trial_cost,

@@ -19,10 +19,10 @@ from wind_sensors.diagnosis.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
 
-ACCEPTED_GAIN = 22.0
+ACCEPTED_GAIN = 14.0
 """Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
 
-ACCEPTED_FURTHER_GAIN = 30.0
+ACCEPTED_FURTHER_GAIN = 22.0
 """The same for a second and a third effect."""
 
 SMALLEST_SIZE = 1.0

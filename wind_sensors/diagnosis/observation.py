@@ -144,6 +144,33 @@ def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
     return np.asarray(mean, dtype=np.float64)
 
 
+STILLNESS = 3
+"""Number of statistics of how still a vane stands between its movements."""
+
+
+def stillness_statistics(series: FloatArray, speed: FloatArray) -> FloatArray:
+    """How still a vane stands between its movements: small turns against large ones.
+
+    Args:
+        series: Angle in each bin [rad], shape (n,).
+        speed: Slow wind speed at the bins [m/s], shape (n,).
+
+    Returns:
+        Logarithms of the ratios of quantiles (25 to 75 %, 10 to 50 %) of the turns from bin to bin
+        in the slowest third of the record, and the first for the rest.
+    """
+    turns = np.abs(np.diff(series)) + 1e-6
+    slow = speed[1:] < np.quantile(speed, 0.33)
+    out = np.zeros(STILLNESS)
+    if np.count_nonzero(slow) < 50:
+        return out
+    q = np.quantile(turns[slow], (0.1, 0.25, 0.5, 0.75))
+    out[0], out[1] = np.log(q[1] / q[3]), np.log(q[0] / q[2])
+    q = np.quantile(turns[~slow], (0.25, 0.75))
+    out[2] = np.log(q[0] / q[1])
+    return out
+
+
 def interval_statistics(
     pulses: Pulses, rotor: Cup | Propeller, direction: FloatArray, grid: Grid
 ) -> FloatArray:

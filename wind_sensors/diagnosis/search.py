@@ -24,6 +24,7 @@ from wind_sensors.diagnosis.signatures import (
     templates_of,
 )
 from wind_sensors.diagnosis.whitening import Whitener, trust_of, whitener_of
+from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -139,9 +140,14 @@ class Searcher:
                         for n in comparison.affected(self.station, t.instrument)
                     }
                 )
-            vector = whitener.of(comparison.simulate(station, only, rest))
+            try:
+                vector = whitener.of(comparison.simulate(station, only, rest))
+            except (UserError, ValueError):
+                continue
             ranked.append((float(vector @ vector), k))
         ranked.sort()
+        if not ranked:
+            ranked = [(np.inf, 0)]
         fits = [
             fit(whitener, self.station, [*fixed, starts[k]], rest)
             for _, k in ranked[: 2 if len(ranked) > 2 else 1]

@@ -11,7 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
-from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of, with_effect
+from wind_sensors.diagnosis.effects.definition import (
+    PLATFORM,
+    STATION,
+    Effect,
+    entry_of,
+    touched,
+    with_effect,
+)
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -58,6 +65,7 @@ class Template:
 
 def entries(station: Station) -> Iterator[str]:
     """Names of everything in a station that can have an effect."""
+    yield STATION
     for instrument in station.instruments:
         yield instrument.name
     if station.platform is not None:
@@ -81,13 +89,18 @@ def templates_of(
     comparison: Comparison, station: Station, effects: Mapping[str, Effect]
 ) -> list[Template]:
     """All templates that a recording of the station could show."""
-    compared = {c.instrument for c in comparison.channels} | {PLATFORM}
+    compared = {c.instrument for c in comparison.channels} | {PLATFORM, STATION}
     out = []
     for name in entries(station):
         if name not in compared:
             continue
         for effect in effects.values():
-            if not effect.applies(entry_of(station, name), station):
+            if effect.everywhere != (name == STATION):
+                continue
+            if not any(
+                effect.applies(entry_of(station, one), station)
+                for one in touched(station, effect, name)
+            ):
                 continue
             out.extend(
                 Template(effect, name, number, values)

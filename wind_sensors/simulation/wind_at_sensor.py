@@ -38,15 +38,23 @@ class Flow:
 
 
 @compiled
-def _scale_by_fourier(wind: FloatArray, c_1: float, s_1: float, c_2: float, s_2: float) -> None:
+def _scale_by_fourier(
+    wind: FloatArray, c_1: float, s_1: float, c_2: float, s_2: float, deflection: float
+) -> None:
     for i in range(wind.shape[0]):
         x, y = -wind[i, 0], -wind[i, 1]
         h = np.hypot(x, y)
         if h > 0.0:
             c, s = x / h, y / h
-            factor = 1.0 + c_1 * c + s_1 * s + c_2 * (c * c - s * s) + s_2 * 2.0 * c * s
+            cc, ss = c * c - s * s, 2.0 * c * s
+            factor = 1.0 + c_1 * c + s_1 * s + c_2 * cc + s_2 * ss
             for k in range(3):
                 wind[i, k] *= factor
+            if deflection != 0.0:
+                turn = -deflection * (c_1 * s - s_1 * c + c_2 * ss - s_2 * cc)
+                ct, st = np.cos(turn), np.sin(turn)
+                u, v = wind[i, 0], wind[i, 1]
+                wind[i, 0], wind[i, 1] = ct * u - st * v, st * u + ct * v
 
 
 @compiled
@@ -147,7 +155,7 @@ class WindAtSensors:
         if distortion != FlowDistortion():
             _scale_by_fourier(
                 in_sensor, distortion.cosine_1, distortion.sine_1, distortion.cosine_2,
-                distortion.sine_2,
+                distortion.sine_2, distortion.deflection,
             )  # fmt: skip
         count = wind.shape[0]
         turning = np.zeros((count, 3))

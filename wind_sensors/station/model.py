@@ -79,6 +79,9 @@ class FlowDistortion(Entry):
     """c2"""
     sine_2: float = 0.0
     """s2"""
+    deflection: float = 0.0
+    """Deflection of the wind that goes with it, 1 as in potential flow: counter-clockwise
+    -deflection (c1 sin theta - s1 cos theta + c2 sin 2 theta - s2 cos 2 theta) [rad]"""
 
 
 class Electronics(Entry):

@@ -11,6 +11,9 @@ from wind_sensors.station.model import Change, Instrument, Platform, Station
 PLATFORM = "platform"
 """Name under which the carrier appears among the instruments."""
 
+STATION = "station"
+"""Name under which everything at once appears: the mount, the air."""
+
 Entrance = Literal["wind", "response", "output", "clock"]
 Values = Mapping[str, float]
 
@@ -67,6 +70,7 @@ class Effect:
         templates: Starting points of the screening; each gives every parameter a value. The
             screening uses one signature per template.
         confusable: Effects it can be mistaken for, with the measurement that separates them.
+        everywhere: It concerns all the instruments it applies to at once (the mount, the air).
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.
@@ -83,6 +87,7 @@ class Effect:
     update: Callable[[Instrument | Platform, Values], dict[str, Any]]
     templates: tuple[dict[str, float], ...]
     confusable: Mapping[str, str] = field(default_factory=dict)
+    everywhere: bool = False
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None
 
@@ -136,6 +141,13 @@ def with_keys(station: Station, instrument: str, keys: Mapping[str, Any]) -> Sta
     )
 
 
+def touched(station: Station, effect: Effect, instrument: str) -> tuple[str, ...]:
+    """Names of the entries that an effect of an instrument changes."""
+    if not effect.everywhere:
+        return (instrument,)
+    return tuple(e.name for e in station.instruments if effect.applies(e, station))
+
+
 def with_effect(
     station: Station,
     effect: Effect,
@@ -144,8 +156,14 @@ def with_effect(
     interval: tuple[float, float | None] | None = None,
 ) -> Station:
     """The station with an effect, for good or within an interval [s since the start]."""
-    keys = effect.update(entry_of(station, instrument), values)
-    if interval is None or (interval[0] <= 0.0 and interval[1] is None):
-        return with_keys(station, instrument, keys)
-    change = Change(start=interval[0], stop=interval[1], instrument=instrument, set=keys)
-    return station.model_copy(update={"changes": (*station.changes, change)})
+    always = interval is None or (interval[0] <= 0.0 and interval[1] is None)
+    changes = []
+    for name in touched(station, effect, instrument):
+        keys = effect.update(entry_of(station, name), values)
+        if always or interval is None:
+            station = with_keys(station, name, keys)
+        else:
+            changes.append(Change(start=interval[0], stop=interval[1], instrument=name, set=keys))
+    if not changes:
+        return station
+    return station.model_copy(update={"changes": (*station.changes, *changes)})

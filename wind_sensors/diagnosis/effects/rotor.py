@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
-from wind_sensors.station.model import Cup, Instrument, Platform, Propeller, Rotor, Station
+from wind_sensors.station.model import Angle, Cup, Instrument, Platform, Propeller, Rotor, Station
 
 Entry = Instrument | Platform
 
@@ -107,7 +107,7 @@ BEARING_FRICTION = Effect(
 
 
 def _density(entry: Entry, values: Values) -> dict[str, Any]:
-    assert isinstance(entry, Rotor)
+    assert isinstance(entry, Rotor | Angle)
     return {"reference_density": entry.reference_density * values["density_ratio"]}
 
 
@@ -121,8 +121,9 @@ AIR_DENSITY = Effect(
     parameters=(
         Parameter("density_ratio", "1", 0.4, 2.5, healthy=1.0, minimum=0.1, step=0.04),
     ),
-    applies=_is_rotor,
+    applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_density,
+    everywhere=True,
     templates=({"density_ratio": 1.1},),
     confusable={
         "rotor_inertia": "a temperature or pressure swing",

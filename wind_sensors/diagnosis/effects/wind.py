@@ -7,6 +7,7 @@ from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
 from wind_sensors.station.model import (
+    Angle,
     FlowDistortion,
     Instrument,
     Platform,
@@ -64,6 +65,7 @@ def _distortion(entry: Entry, values: Values) -> dict[str, Any]:
             sine_1=values["sine_1"],
             cosine_2=values["cosine_2"],
             sine_2=values["sine_2"],
+            deflection=values["deflection"],
         )
     }
 
@@ -78,18 +80,22 @@ _HARMONICS = ("cosine_1", "sine_1", "cosine_2", "sine_2")
 
 FLOW_DISTORTION = Effect(
     name="flow_distortion",
-    meaning="The mount speeds the flow up and slows it down, smoothly with the wind's direction.",
+    meaning="The mount speeds the flow up, slows it down and turns it, smoothly with direction.",
     entrance="wind",
-    equation="U' = U (1 + c1 cos T + s1 sin T + c2 cos 2T + s2 sin 2T), T the direction from",
+    equation="U' = U (1 + c1 cos T + s1 sin T + c2 cos 2T + s2 sin 2T), T the direction from; "
+    "turned by -d (c1 sin T - s1 cos T + c2 sin 2T - s2 cos 2T)",
     source="Fourier series of the potential flow around a cylinder",
     region="all directions, smoothly",
-    parameters=tuple(
-        Parameter(name, "1", -0.3, 0.3, minimum=0.02) for name in _HARMONICS
+    parameters=(
+        *(Parameter(name, "1", -0.3, 0.3, minimum=0.02) for name in _HARMONICS),
+        Parameter("deflection", "1", -2.0, 2.0, healthy=None, step=0.2, starts=(0.0,)),
     ),
-    applies=_is_rotor,
+    applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_distortion,
+    everywhere=True,
     templates=tuple(
-        {other: 0.02 if other == name else 0.0 for other in _HARMONICS} for name in _HARMONICS
+        {**{other: 0.02 if other == name else 0.0 for other in _HARMONICS}, "deflection": 1.0}
+        for name in _HARMONICS
     ),
     confusable={
         "wake_shadow": "wind from the neighbouring sectors: a distortion does not end",
@@ -121,9 +127,10 @@ AXIS_TILT = Effect(
         Parameter("tilt_y", "deg", -30.0, 30.0, minimum=3.0, step=0.5),
     ),
     applies=lambda entry, station: (
-        isinstance(entry, Rotor) and not getattr(entry, "mounted_on", "")
+        isinstance(entry, Rotor | Angle) and not getattr(entry, "mounted_on", "")
     ),
     update=_tilt,
+    everywhere=True,
     templates=({"tilt_x": 3.0, "tilt_y": 0.0}, {"tilt_x": 0.0, "tilt_y": 3.0}),
     confusable={
         "flow_distortion": "a spirit level on the mount",
