@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from wind_sensors.nodes.recorder import RecorderNode
+    from wind_sensors.station.model import Station
 
 
 def register(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -89,18 +90,27 @@ def run(args: argparse.Namespace) -> int:
         execution.run(build, ros_arguments(args), until=until)
     if not made:
         return 0
-    show(made[0], args.output, console)
+    show(made[0], args.output, console, args.topics or _expected(station))
     return 0
 
 
-def show(recorder: RecorderNode, output: str, console: Console) -> None:
-    """Say what was recorded."""
+def _expected(station: Station | None) -> list[str]:
+    from wind_sensors.nodes.topics import raw_topics
+
+    return [] if station is None else raw_topics(station)
+
+
+def show(
+    recorder: RecorderNode, output: str, console: Console, expected: Collection[str] = ()
+) -> None:
+    """Say what was recorded, and which of the expected topics nobody published."""
     table = Table("topic", "messages", title=f"Recorded to {output}", title_justify="left")
     for topic, count in sorted(recorder.counts.items()):
         table.add_row(topic, str(count))
     console.print(table)
     for topic, reason in recorder.refused.items():
         console.print(f"not recorded: {topic}: {reason}")
-    missing = recorder.missing
+    wanted = {recorder.resolve_topic_name(topic) for topic in expected}
+    missing = [topic for topic in recorder.missing if topic in wanted]
     if missing:
         console.print(f"nobody published: {', '.join(missing)}")

@@ -23,6 +23,7 @@ from wind_sensors.nodes.inputs import EstimatorInputs
 from wind_sensors.nodes.outputs import TOPICS, WindPublishers
 from wind_sensors.nodes.parameters import Parameter, Value, changed, declare, describe
 from wind_sensors.nodes.quality import INPUT_DEPTH, input_quality, subscribe
+from wind_sensors.nodes.rehearsal import warm_up
 from wind_sensors.nodes.station_parameters import (
     STATION,
     Role,
@@ -203,7 +204,7 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         float,
         2.0,
         "When nothing at all has arrived for this long of wall time [s], the node's own clock "
-        "moves the estimate on.",
+        "moves the estimate on, this far behind it.",
         minimum=0.1,
         maximum=600.0,
         changeable=True,
@@ -262,13 +263,16 @@ class EstimatorNode(Node):
         self.station = self._station(self._values)
         require(self.station, kind.needs, kind.name)
         self._show_effective_values(instruments)
-        self._estimator = make_estimator(self.station, self._settings(self._values))
+        settings = self._settings(self._values)
+        self._estimator = make_estimator(self.station, settings)
+        warm_up(self.station, settings)
         self._inputs = EstimatorInputs(self.station, self._estimator, self._now)
         platform = self.station.platform
         declination = None if platform is None else platform.magnetic_declination_deg
         self._outputs = WindPublishers(self, declination)
         self._apply_publishing()
         self.received_at = time.monotonic()
+        self._idle_checks = 0
         self._last_estimate: WindEstimate | None = None
         for source in self._inputs.sources():
             subscribe(
@@ -290,6 +294,16 @@ class EstimatorNode(Node):
             _IDLE_CHECK, self._while_silent, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self.add_on_set_parameters_callback(self._on_set_parameters)
+
+    @property
+    def topics(self) -> set[str]:
+        """Resolved names of the topics it listens to."""
+        return {self.resolve_topic_name(topic) for topic in self._inputs.counts}
+
+    @property
+    def received(self) -> int:
+        """Raw messages so far."""
+        return sum(count.received for count in self._inputs.counts.values())
 
     @property
     def last_wind(self) -> str:
@@ -329,6 +343,7 @@ class EstimatorNode(Node):
     def _receiver(self, receive: Any) -> Any:
         def received(message: Any) -> None:
             self.received_at = time.monotonic()
+            self._idle_checks = 0
             receive(message)
             self._publish()
 
@@ -344,11 +359,15 @@ class EstimatorNode(Node):
 
     def _while_silent(self) -> None:
         """Only when every input is silent may the clock speak: stamps alone rule otherwise."""
-        if time.monotonic() - self.received_at < _number(self._values["silence"]):
+        self._idle_checks += 1
+        silence = _number(self._values["silence"])
+        # Checks are counted instead of seconds: after a long callback the messages that queued up
+        # behind it must come first.
+        if self._idle_checks * _IDLE_CHECK < silence:
             return
-        now = self._now()
-        if now > 0:
-            self._estimator.advance(now)
+        until = self._now() - round(silence * _SECOND)
+        if until > 0:
+            self._estimator.advance(until)
             self._publish()
 
     def _health(self) -> Iterable[Status]:
