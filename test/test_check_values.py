@@ -30,6 +30,7 @@ from wind_sensors.instruments import (
     periodic,
     propeller,
     propeller_array,
+    propeller_turbulence,
     propeller_vane,
     pulses,
     rotor_family,
@@ -69,7 +70,8 @@ def expression(text: str) -> Callable[[Any], Any]:
     formula = re.split(r"\s\((?=[a-z ,]*(?:test|not|from)\b)", text.strip())[0].strip()
     if formula in _FUNCTIONS:
         formula += "(theta)"
-    formula = re.sub(r"(\d|\))\s*(?=theta|cos|sin|sqrt)", r"\1*", formula).replace("^", "**")
+    # Products are written without a sign: `0.98 theta`, `cos(theta)(1-...)`.
+    formula = re.sub(r"(\d|\))\s*(?=theta|cos|sin|sqrt|\()", r"\1*", formula).replace("^", "**")
     tree = ast.parse(formula, mode="eval").body
 
     def evaluate(node: ast.expr, theta: Any) -> Any:
@@ -161,9 +163,20 @@ def cup_gust(i: Inputs) -> float:
 
 
 def sinusoid(i: Inputs) -> periodic.PeriodicRate:
-    return friction_propeller.sinusoidal_rate(
+    return PT.sinusoidal_rate(
         i["A=du/U"], 2.0 * math.pi * i["L"] / i["wavelength"], i["Us"] / i["Ubar"]
     )
+
+
+def constants(i: Inputs) -> tuple[float, surface_layer.VarianceRatios]:
+    """Coefficient of K94 (73) and variance ratios: K94's unless inputs name others."""
+    v2, w2 = i.get("v2/ust2", 2.68), i.get("w2/ust2", 1.46)
+    coefficient = vane_variance.neutral_loss_coefficient(
+        i.get("alpha1_kappa43", surface_layer.ALPHA1_KAPPA43),
+        i.get("kappa", surface_layer.VON_KARMAN_CONSTANT),
+        v2,
+    )
+    return coefficient, surface_layer.VarianceRatios(u=0.0, v=v2, w=w2)
 
 
 def uf_from_10(i: Inputs, identifier: str) -> float:
@@ -221,7 +234,15 @@ def intervals(i: Inputs) -> pulses.MeanSpeed:
 def bias_100(i: Inputs) -> float:
     ratios = surface_layer.VarianceRatios(u=0.0, v=i["v2/ust2"], w=i["w2/ust2"])
     return speed_bias.neutral_bias(
-        i["ell0"], i["z"], i["z0"], ratios, i["a4"], i["mu1"], i["mu2"], i["alpha"], i["kappa"]
+        i["ell0"],
+        i["z"],
+        i["z0"],
+        ratios,
+        i["a4"],
+        i.get("mu1", 0.0),
+        i["mu2"],
+        i.get("alpha", 1.7),
+        i.get("kappa", 0.4),
     ).total
 
 
@@ -296,7 +317,13 @@ def damped_energy(_: Inputs) -> float:
 
 def diabatic(i: Inputs) -> float:
     return speed_bias.diabatic_longitudinal_bias(
-        i["ell0"], i["z"], i["z/z0"], i["z/L"], i["a4"], i["mu1"], i["alpha1_kappa43"]
+        i["ell0"],
+        i["z"],
+        i["z/z0"],
+        i["z/L"],
+        i["a4"],
+        i.get("mu1", 0.0),
+        i.get("alpha1_kappa43", 0.165),
     )
 
 
@@ -305,6 +332,7 @@ def exponential_correlation(i: Inputs) -> float:
 
 
 FP = friction_propeller
+PT = propeller_turbulence
 VK = von_karman
 SL = surface_layer
 
@@ -332,7 +360,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "cup.inertial_w_coeff": lambda i: speed_bias.INERTIAL_VERTICAL_COEFFICIENT,
     "cup.u_coeff_alpha1": lambda i: speed_bias.INERTIAL_COEFFICIENT_ALPHA1,
     "cup.coeff_102": lambda i: speed_bias.neutral_longitudinal_coefficient(
-        i["alpha"], i["kappa"], i["sigma_u/ustar"]
+        i.get("alpha", 1.7), i.get("kappa", 0.4), i.get("sigma_u/ustar", 2.39)
     ),
     "cup.bias_104": lambda i: (
         speed_bias.isotropic_bias(i["q*ell0"], i["sigma/U"], i["a4"], i["mu1"], i["mu2"]).total
@@ -397,11 +425,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "vane.zeta0": lambda i: vane_variance.damping_without_loss(i["beta"]),
     "vane.s_cross": lambda i: vane_variance.crossing(i["beta"]),
     "vane.D_beta": lambda i: vane_variance.recovered_fraction(i["beta"]),
-    "vane.coeff_73": lambda i: vane_variance.neutral_loss_coefficient(
-        i["alpha1_kappa43"], i["kappa"], i["v2/ust2"]
-    ),
+    "vane.coeff_73": lambda i: constants(i)[0],
     "vane.relative_loss": lambda i: vane_variance.neutral_relative_loss(
-        i["zeta"], i["l_v"], i["z"]
+        i["zeta"], i["l_v"], i["z"], constants(i)[0]
     ),
     "vane.variance_ratio_vonKarman": lambda i: moments(i).direction,
     "vane.vphi_vonKarman": lambda i: moments(i).lateral,
@@ -436,9 +462,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "prop.J80.sin_amp1": lambda i: abs(sinusoid(i).first_harmonic()) / i["A=du/U"],
     "prop.J80.sin_phase1": lambda i: np.angle(sinusoid(i).first_harmonic()),
     "prop.J80.sin_max": lambda i: (sinusoid(i).maximum() - 1.0) / i["A=du/U"],
-    "prop.J80.variance_vonKarman": lambda i: FP.variance_von_karman(i["q*L"], i["Us/Ubar"]),
-    "prop.J80.overspeed_vonKarman": lambda i: FP.mean_excess_von_karman(i["q*L"], i["Us/Ubar"]),
-    "prop.J80.Leff_ratio": lambda i: FP.effective_length_ratio(i["I"], i["b"], i["c*h"]),
+    "prop.J80.variance_vonKarman": lambda i: PT.variance_von_karman(i["q*L"], i["Us/Ubar"]),
+    "prop.J80.overspeed_vonKarman": lambda i: PT.mean_excess_von_karman(i["q*L"], i["Us/Ubar"]),
+    "prop.J80.Leff_ratio": lambda i: PT.effective_length_ratio(i["I"], i["b"], i["c*h"]),
     "prop.J80.omegadot": lambda i: FP.angular_acceleration(
         i["omega"], i["U"], math.radians(i["theta_deg"]), friction_rotor(i)
     ),
@@ -451,12 +477,18 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
         propeller_array.uncorrected_velocity(propeller_array.orthogonal_axes(), i["readings"])
     ),
     "propvane.delta_vonKarman": propvane_von_karman,
-    "propvane.coeff114_const": lambda i: propeller_vane.neutral_constant(i["mu2"]),
+    "propvane.coeff114_const": lambda i: propeller_vane.neutral_constant(i["mu2"], constants(i)[1]),
     "propvane.coeff116": lambda i: propeller_vane.neutral_slope(
-        i["zeta"], i["a"] / i["l_v"], i["mu2"]
+        i["zeta"], i["a"] / i["l_v"], i["mu2"], constants(i)[0]
     ),
     "propvane.delta_over_half_v2": lambda i: propeller_vane.neutral_relative_bias(
-        i["zeta"], i["a"] / i["l_v"], i["mu2"], i["l_v"], i["z"]
+        i["zeta"],
+        i["a"] / i["l_v"],
+        i["mu2"],
+        i["l_v"],
+        i["z"],
+        constants(i)[1],
+        constants(i)[0],
     ),
     "propvane.delta_pv": surface_delta,
     "propvane.gust_mean_v": propvane_gust,
@@ -464,7 +496,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "surf.phi_m": lambda i: SL.wind_shear_function(i["z/L"]),
     "surf.phi_eps": lambda i: SL.dissipation_function(i["z/L"]),
     "surf.chi_pv": lambda i: SL.surface_layer_bias_function(
-        i["z/z0"], i["z/L"], i["alpha1_kappa43"]
+        i["z/z0"], i["z/L"], i.get("alpha1_kappa43", 0.165)
     ),
     "cupvane.U": lambda i: run(i).east,
     "cupvane.V": lambda i: run(i).north,

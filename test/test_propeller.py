@@ -10,7 +10,7 @@ import pytest
 from scipy import integrate
 
 from wind_sensors.instruments import friction_propeller as jackson
-from wind_sensors.instruments import propeller
+from wind_sensors.instruments import propeller, propeller_turbulence
 from wind_sensors.instruments.friction_propeller import FrictionPropeller
 from wind_sensors.turbulence import von_karman
 
@@ -123,22 +123,25 @@ def test_second_order_turbulence_formulas_against_their_spectral_integrals() -> 
     variance = integral(lambda _: (mean**2 + stall**2) ** 2) / mean**2
     ratio = stall / mean
     assert excess == pytest.approx(
-        float(jackson.mean_excess_von_karman(q * length, ratio)) * sigma**2 / mean, rel=1e-6
+        float(propeller_turbulence.mean_excess_von_karman(q * length, ratio)) * sigma**2 / mean,
+        rel=1e-6,
     )
     assert variance == pytest.approx(
-        float(jackson.variance_von_karman(q * length, ratio)) * sigma**2, rel=1e-6
+        float(propeller_turbulence.variance_von_karman(q * length, ratio)) * sigma**2, rel=1e-6
     )
 
 
 def test_small_sinusoids_follow_the_linear_response() -> None:
     k, stall = 2.0 * math.pi / 16.0, 0.015
-    rate = jackson.sinusoidal_rate(1e-4, k, stall)
+    rate = propeller_turbulence.sinusoidal_rate(1e-4, k, stall)
     assert rate.first_harmonic() / 1e-4 == pytest.approx(
-        jackson.sinusoidal_gain(k, stall), rel=1e-6
+        propeller_turbulence.sinusoidal_gain(k, stall), rel=1e-6
     )
     # Jackson's figures for a wavelength of 16 L.
-    assert abs(jackson.sinusoidal_gain(k, 0.0)) == pytest.approx(0.931, abs=5e-4)
-    assert math.degrees(np.angle(jackson.sinusoidal_gain(k, 0.0))) == pytest.approx(-21.4, abs=0.1)
+    assert abs(propeller_turbulence.sinusoidal_gain(k, 0.0)) == pytest.approx(0.931, abs=5e-4)
+    assert math.degrees(np.angle(propeller_turbulence.sinusoidal_gain(k, 0.0))) == pytest.approx(
+        -21.4, abs=0.1
+    )
 
 
 def test_transverse_form_is_the_equation_near_ninety_degrees() -> None:
@@ -153,14 +156,14 @@ def test_transverse_form_is_the_equation_near_ninety_degrees() -> None:
     )
     angle, speed, rate = 1.45, 6.0, 3.0
     full = 0.2 * float(jackson.angular_acceleration(rate, speed, angle, rotor))
-    near = jackson.transverse_acceleration(
+    near = propeller_turbulence.transverse_acceleration(
         0.2 * rate, speed, speed * math.cos(angle), 1.1, 0.2, a, b, c
     )
     assert float(near) == pytest.approx(full, rel=1e-12)
-    assert float(jackson.effective_length_ratio(0.1, 0.05, 1.5)) == pytest.approx(5.0)
-    fichtl = jackson.fichtl_kumar_length_ratio(np.array([0.1, 0.8]), 1.0)
+    assert float(propeller_turbulence.effective_length_ratio(0.1, 0.05, 1.5)) == pytest.approx(5.0)
+    fichtl = propeller_turbulence.fichtl_kumar_length_ratio(np.array([0.1, 0.8]), 1.0)
     assert fichtl[0] / fichtl[1] == pytest.approx(4.0)
-    assert float(jackson.transverse_spectral_ratio(1.0, 0.9)) == pytest.approx(0.405)
+    assert float(propeller_turbulence.transverse_spectral_ratio(1.0, 0.9)) == pytest.approx(0.405)
 
 
 def test_torque_gives_the_lengths_of_the_equation() -> None:

@@ -21,6 +21,7 @@ from wind_sensors.instruments.vane_variance import (
     VaneMoments,
     g_integral,
     h_integral,
+    neutral_loss_coefficient,
     von_karman_moments,
 )
 from wind_sensors.turbulence import surface_layer
@@ -224,27 +225,26 @@ def neutral_constant(
 
 
 def neutral_slope(
-    damping_ratio: float,
-    arm_ratio: float,
-    mu2: float,
-    alpha1_kappa43: float = surface_layer.ALPHA1_KAPPA43,
-    kappa: float = surface_layer.VON_KARMAN_CONSTANT,
-    lateral_ratio: float = surface_layer.KRISTENSEN_1994_RATIOS.v,
+    damping_ratio: float, arm_ratio: float, mu2: float, coefficient: float | None = None
 ) -> float:
     """Factor of -(l_v/z)^(2/3) in K94 (114), (116) [1].
 
     Args:
         damping_ratio, arm_ratio, mu2: As in `inertial_braces`.
-        alpha1_kappa43: alpha_1 kappa^(4/3) [1].
-        kappa: von Karman constant.
-        lateral_ratio: <v^2>/u_*^2 [1].
+        coefficient: `vane_variance.neutral_loss_coefficient` of other constants than K94's [1].
     """
-    coefficient = 4.0 / 3.0 * alpha1_kappa43 / (kappa * kappa * lateral_ratio)
-    return coefficient * inertial_braces(damping_ratio, arm_ratio, mu2)
+    factor = neutral_loss_coefficient() if coefficient is None else coefficient
+    return factor * inertial_braces(damping_ratio, arm_ratio, mu2)
 
 
 def neutral_relative_bias(
-    damping_ratio: float, arm_ratio: float, mu2: float, distance_constant: float, height: float
+    damping_ratio: float,
+    arm_ratio: float,
+    mu2: float,
+    distance_constant: float,
+    height: float,
+    ratios: surface_layer.VarianceRatios = surface_layer.KRISTENSEN_1994_RATIOS,
+    coefficient: float | None = None,
 ) -> float:
     """delta/(<v^2>/(2 U^2)) [1] in the neutral surface layer; K94 (114), (116).
 
@@ -252,9 +252,12 @@ def neutral_relative_bias(
         damping_ratio, arm_ratio, mu2: As in `inertial_braces`.
         distance_constant: l_v [m].
         height: z [m].
+        ratios: Variances over u_*^2.
+        coefficient: As in `neutral_slope`.
     """
     scale = math.pow(distance_constant / height, 2.0 / 3.0)
-    return neutral_constant(mu2) - neutral_slope(damping_ratio, arm_ratio, mu2) * scale
+    slope = neutral_slope(damping_ratio, arm_ratio, mu2, coefficient)
+    return neutral_constant(mu2, ratios) - slope * scale
 
 
 def rate_in_lateral_gusts(

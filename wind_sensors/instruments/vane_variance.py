@@ -155,16 +155,23 @@ def neutral_loss_coefficient(
     return 4.0 / 3.0 * alpha1_kappa43 / (kappa * kappa * lateral_ratio)
 
 
-def neutral_relative_loss(damping_ratio: float, distance_constant: float, height: float) -> float:
+def neutral_relative_loss(
+    damping_ratio: float,
+    distance_constant: float,
+    height: float,
+    coefficient: float | None = None,
+) -> float:
     """1 - U^2 <phi^2>/<v^2> [1] in the neutral surface layer; K94 (73).
 
     Args:
         damping_ratio: zeta.
         distance_constant: l_v [m].
         height: z [m].
+        coefficient: `neutral_loss_coefficient` of other constants than K94's [1].
     """
     scale = math.pow(distance_constant / height, 2.0 / 3.0)
-    return neutral_loss_coefficient() * loss_integral(damping_ratio) * scale
+    factor = neutral_loss_coefficient() if coefficient is None else coefficient
+    return factor * loss_integral(damping_ratio) * scale
 
 
 def moments(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from wind_sensors.instruments import friction_propeller
+from wind_sensors.instruments import friction_propeller, propeller_turbulence
 from wind_sensors.report.paper_figures.style import (
     BLUE,
     GREEN,
@@ -75,18 +75,18 @@ def transverse_length(figure: Figure) -> None:
     intensity = np.linspace(0.005, 0.4, 400)
     axes.plot(
         intensity,
-        friction_propeller.effective_length_ratio(intensity, 0.05, 1.5),
+        propeller_turbulence.effective_length_ratio(intensity, 0.05, 1.5),
         color=BLUE,
         label=r"(9b): $L/L_e=0.05+1.5\,I_w$",
     )
     axes.plot(intensity, 0.05 + 1.5 * intensity, **PRINTED, label=r"the same printed as $L_e/L$")
     # Fichtl and Kumar's constant is not in the report; theirs is drawn through the fit at 0.1.
-    factor = float(friction_propeller.effective_length_ratio(0.1, 0.05, 1.5)) / float(
-        friction_propeller.fichtl_kumar_length_ratio(0.1, 1.0)
+    factor = float(propeller_turbulence.effective_length_ratio(0.1, 0.05, 1.5)) / float(
+        propeller_turbulence.fichtl_kumar_length_ratio(0.1, 1.0)
     )
     axes.plot(
         intensity,
-        friction_propeller.fichtl_kumar_length_ratio(intensity, factor),
+        propeller_turbulence.fichtl_kumar_length_ratio(intensity, factor),
         color=GREEN,
         linestyle="--",
         label=r"Fichtl and Kumar, $\propto I_w^{-2/3}$, set equal at 0.1",
@@ -102,13 +102,13 @@ def distorted_sinusoid(figure: Figure) -> None:
     phase = np.linspace(0.0, 2.0 * math.pi, 500)
     frequency, stall = 2.0 * math.pi / 16.0, FIGURE_4_STALL_SPEED / 10.0
     axes.plot(phase, np.sin(phase), color=GREY, linewidth=0.9, label="wind")
-    linear = friction_propeller.sinusoidal_gain(frequency, stall)
+    linear = propeller_turbulence.sinusoidal_gain(frequency, stall)
     axes.plot(
         phase, np.imag(linear * np.exp(1j * phase)), color=GREEN, linestyle="--",
         label=r"linear, time constant $L/\bar U$",
     )  # fmt: skip
     for amplitude, color in ((0.2, ORANGE), (0.8, BLUE)):
-        rate = friction_propeller.sinusoidal_rate(amplitude, frequency, stall)
+        rate = propeller_turbulence.sinusoidal_rate(amplitude, frequency, stall)
         axes.plot(
             phase,
             (rate.at(phase) - 1.0) / amplitude,
