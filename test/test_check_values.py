@@ -48,9 +48,25 @@ PATH = Path(
         Path(__file__).resolve().parents[1] / ".." / "shared" / "check_values.json",
     )
 )
-ENTRIES: list[dict[str, Any]] = json.loads(PATH.read_text())["values"] if PATH.exists() else []
-
 Inputs = dict[str, Any]
+
+
+def read_entries(path: Path) -> list[dict[str, Any]]:
+    """The file's entries; an angular response given `as above` is that of the entry before."""
+    entries: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["values"]
+    known: dict[str, str] = {}
+    for entry in entries:
+        family = entry["id"].split(".")[0]
+        response = entry["inputs"].get("f")
+        if response == "as above":
+            entry["inputs"]["f"] = known[family]
+        elif response is not None:
+            known[family] = response
+    return entries
+
+
+# A file that was named must be there; only the default may be absent.
+ENTRIES = read_entries(PATH) if PATH.exists() or "WIND_CHECK_VALUES" in os.environ else []
 
 
 # Expressions of angular responses, as the file writes them.
@@ -90,27 +106,13 @@ def expression(text: str) -> Callable[[Any], Any]:
     return lambda theta: evaluate(tree, np.asarray(theta, dtype=float))
 
 
-def response_above(identifier: str) -> str:
-    """The angular response that `as above` refers to."""
-    known = ""
-    for entry in ENTRIES:
-        text = str(entry["inputs"].get("f", ""))
-        if text and text != "as above":
-            known = text
-        if entry["id"] == identifier:
-            break
-    return known
-
-
-def friction_rotor(i: Inputs, identifier: str = "") -> friction_propeller.FrictionPropeller:
-    f = str(i.get("f", "cos"))
-    f = response_above(identifier) if f == "as above" else f
+def friction_rotor(i: Inputs) -> friction_propeller.FrictionPropeller:
     g = expression(str(i["g/g0"])) if "g/g0" in i else friction_propeller.torque_slope_ratio
     return friction_propeller.FrictionPropeller(
         calibration_distance=i.get("P", 1.0),
         response_length=i.get("L", 1.0),
         stall_speed=i.get("Us", 0.0),
-        f=expression(f),
+        f=expression(str(i.get("f", "cos"))),
         g=g,
     )
 
@@ -193,9 +195,9 @@ def uf_from_10(i: Inputs, identifier: str) -> float:
     return float(roots.other if flipped else roots.value)
 
 
-def array_reading(axis: int) -> Callable[[Inputs, str], float]:
-    def handler(i: Inputs, identifier: str) -> float:
-        rotor = friction_rotor(i, identifier)
+def array_reading(axis: int) -> Callable[[Inputs], float]:
+    def handler(i: Inputs) -> float:
+        rotor = friction_rotor(i)
         return float(
             propeller_array.steady_readings(propeller_array.orthogonal_axes(), rotor, i["U"])[axis]
         )
@@ -203,9 +205,9 @@ def array_reading(axis: int) -> Callable[[Inputs, str], float]:
     return handler
 
 
-def recovered_speed(i: Inputs, identifier: str) -> float:
+def recovered_speed(i: Inputs) -> float:
     estimate = propeller_array.solve(
-        propeller_array.orthogonal_axes(), friction_rotor(i, identifier), i["readings"]
+        propeller_array.orthogonal_axes(), friction_rotor(i), i["readings"]
     )
     assert estimate.converged.all()
     return float(np.linalg.norm(estimate.velocity))
@@ -514,10 +516,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "bivane.damped_period": lambda i: bivane.damped_period(i["L"], i["V"], i["zeta"]),
 }
 
-NEEDS_IDENTIFIER = {uf_from_10, recovered_speed} | {
-    FUNCTIONS[f"array.reading_{axis}"] for axis in "xyz"
-}
-
 
 def function_for(identifier: str) -> Callable[..., Any]:
     """Function of an identifier: the part before the first `=`, without trailing qualifiers."""
@@ -531,7 +529,7 @@ def function_for(identifier: str) -> Callable[..., Any]:
 
 def evaluate(identifier: str, inputs: Inputs) -> float:
     function = function_for(identifier)
-    if function in NEEDS_IDENTIFIER:
+    if function is uf_from_10:
         return float(function(inputs, identifier))
     return float(function(inputs))
 

@@ -28,7 +28,9 @@ from wind_sensors.report.paper_figures.style import (
 
 def frequency_response(figure: Figure) -> None:
     """Fig. 1: gain and phase of the bivane, and of the bivane with its reduction."""
-    gain_axes, phase_axes = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    gain_axes, phase_axes = figure.subplots(
+        2, 1, sharex=True, gridspec_kw={"height_ratios": (2, 1)}
+    )
     s = np.geomspace(0.1, 10.0, 500)
     sampling = bivane.reduced_sampling(MITSUTA_WIND_RUN, MITSUTA_SPEED, MITSUTA_INTERVAL)
     nyquist = math.pi / sampling
