@@ -15,7 +15,7 @@ NODES = (
     "monitor_node",
 )
 NUMBERS = ["numpy>=1.24", "scipy>=1.10", "numba>=0.58"]
-FILES = ["rosbags>=0.11", "ruamel.yaml>=0.17.21", "pydantic>=2.7", "lz4"]
+FILES = ["rosbags>=0.11", "ruamel.yaml>=0.17.21", "pydantic>=2.7", "lz4", "tzdata"]
 PEOPLE = ["rich>=12.4", "matplotlib>=3.6"]
 ROS_WHEELS = [
     f"ros-jazzy-{package}"
