@@ -83,10 +83,15 @@ def generate_recording(spec: RecordingSpec) -> list[dict[str, Any]]:
     """
     spec.folder.mkdir(parents=True)
     scene = build_scene(spec.station, spec.weather, spec.minutes, spec.seed)
-    answers = [_plant(scene, planted) for planted in spec.planted]
+    return record(scene, spec.planted, spec.folder)
+
+
+def record(scene: Scene, planted: Sequence[Planted], folder: Path) -> list[dict[str, Any]]:
+    """Conceal causes in a scene, run it and write what was recorded into an existing folder."""
+    answers = [_plant(scene, each) for each in planted]
     signals = run_scene(scene)
-    write_bag(spec.folder / "bag", signals, spec.station.rotor_name)
-    write_sheet(spec.folder / "recording.yaml", spec.station)
+    write_bag(folder / "bag", signals, scene.station.rotor_name)
+    write_sheet(folder / "recording.yaml", scene.station)
     return [_plain(entry) for entry in answers]
 
 

@@ -73,8 +73,18 @@ class Scene:
         self.stamp_changes.setdefault(channel, []).append(change)
 
 
-def build_scene(station: Station, weather: Weather, minutes: float, seed: int) -> Scene:
-    """Draw the wind, motion and air of a record of a healthy station."""
+def build_scene(
+    station: Station,
+    weather: Weather,
+    minutes: float,
+    seed: int,
+    measured: Array | None = None,
+) -> Scene:
+    """Draw the wind, motion and air of a record of a healthy station.
+
+    measured: wind (n, 3) [m/s] on the grid of the record that really blew at the instrument of a
+    mast; then only its difference from the reference's place is drawn.
+    """
     rng = np.random.default_rng([seed, station.seed, ord(station.kind), 5])
     time = np.arange(round(60.0 * minutes * GRID_RATE) + 1) / GRID_RATE
     slow = slow_wind(rng, time, weather)
@@ -112,6 +122,9 @@ def build_scene(station: Station, weather: Weather, minutes: float, seed: int) -
     )
     reference = wind_at(averaged, run - ahead + 20.0)
     instrument = wind_at(eddies.instrument, run + 20.0)
+    if measured is not None:
+        reference = measured + reference - instrument
+        instrument = measured
     apparent = _apparent(station, motion, matrix, instrument)
     temperature = weather.temperature + weather.temperature_swing * np.sin(
         2.0 * np.pi * time / rng.uniform(600.0, 1500.0) + rng.uniform(0.0, 2.0 * np.pi)

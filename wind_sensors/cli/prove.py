@@ -53,6 +53,11 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     peers.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     peers.add_argument("--jobs", type=_positive, default=1)
 
+    real = steps.add_parser("real", help="diagnose real records, and doses planted into them")
+    real.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
+    real.add_argument("--from", dest="local", type=Path, metavar="DIR", help="copies to use")
+    real.add_argument("--force", action="store_true", help="replace an earlier page")
+
     demo = steps.add_parser("demo", help="one case from sealing to opening in two minutes")
     demo.add_argument("-o", "--output", type=Path, default=Path("prove_demo"), metavar="DIR")
     demo.add_argument("--seed", type=int, default=7)
@@ -63,7 +68,14 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Run one step; 0 on success, 1 where `open` finds a promise broken."""
-    steps = {"seal": _seal, "run": _run, "open": _open, "peers": _peers, "demo": _demo}
+    steps = {
+        "seal": _seal,
+        "run": _run,
+        "open": _open,
+        "peers": _peers,
+        "real": _real,
+        "demo": _demo,
+    }
     return steps[arguments.step](arguments)
 
 
@@ -133,6 +145,20 @@ def _peers(arguments: argparse.Namespace) -> int:
     judged = judge_all(arguments.folder, answers)
     rows = compare(arguments.folder, answers, judged, arguments.jobs)
     print(f"wrote {write_table(arguments.output or arguments.folder / 'score', rows)}")
+    return 0
+
+
+def _real(arguments: argparse.Namespace) -> int:
+    import shutil
+
+    from proving_ground.real.page import run_real
+
+    output: Path = arguments.output
+    if output.exists():
+        if not arguments.force:
+            raise UserError("the folder exists already", str(output), "Add --force to replace it.")
+        shutil.rmtree(output)
+    print(f"wrote {run_real(output, arguments.local)}")
     return 0
 
 

@@ -1,0 +1,1 @@
+"""Records of real instruments, and causes planted into them."""
