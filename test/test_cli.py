@@ -1,0 +1,162 @@
+"""The front door, `wind info` and `wind plot`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wind_sensors.cli import main as front
+from wind_sensors.cli.main import main
+from wind_sensors.recordings import write_recording
+from wind_sensors.report import plots
+from wind_sensors.station.model import Cup, Input, Propeller, Reference, Station, Vane
+from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
+
+START = 1_767_225_600_000_000_000
+SLOTS = (0.02, -0.01, 0.0, -0.01)
+
+
+def steady_recording(speed: float = 8.0, seconds: float = 120.0) -> Recording:
+    """A cup with uneven slots in a wind that oscillates slowly around a mean."""
+    cup = Cup(
+        name="cup",
+        pulses=Input(topic="/cup/pulses"),
+        pulses_per_revolution=4,
+        calibration_distance=0.2,
+        distance_constant=1.7,
+        starting_speed=0.25,
+    )
+    vane = Vane(
+        name="vane", joint_states=Input(topic="/vane"), distance_constant=0.5, damping_ratio=0.4
+    )
+    station = Station(
+        instruments=(cup, vane), reference=Reference(topic=Input(topic="/reference/wind"))
+    )
+    rate = (speed - cup.starting_speed) / cup.calibration_distance / (2.0 * np.pi)
+    slots = np.arange(int(seconds * rate * 4))
+    edges = (slots + np.cumsum([0.0, *SLOTS[:-1]])[slots % 4]) / 4.0 / rate
+    time = START + np.rint(edges * 1e9).astype(np.int64)
+    grid = START + np.arange(int(seconds * 20), dtype=np.int64) * 50_000_000
+    wave = np.sin(2.0 * np.pi * np.arange(len(grid)) / 400.0)
+    wind = np.stack([speed + wave, 0.5 * wave, 0.0 * wave], axis=1)
+    return Recording(
+        "steady", station, START, int(grid[-1]),
+        {"cup": Pulses(time)},
+        {"vane": Angles(grid, np.pi + 0.1 * wave)},
+        Winds(grid, wind),
+    )  # fmt: skip
+
+
+def test_help_lists_what_is_installed_and_starts_at_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["--help"])
+    assert stopped.value.code == 0
+    told = capsys.readouterr().out
+    for command in ("info", "plot", "import"):
+        assert f"  {command}" in told
+    assert main([]) == 0
+    code = "import sys, wind_sensors.cli.main as m\n"
+    code += "try: m.main(['--help'])\nexcept SystemExit: pass\n"
+    code += "sys.exit(any(name in sys.modules for name in ('numpy', 'numba', 'matplotlib')))"
+    asked = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert asked.returncode == 0, "help must not load the numerical libraries"
+
+
+def test_a_command_that_is_not_there_is_not_listed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(front.COMMANDS, "levitate", "not yet")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "levitate" not in capsys.readouterr().out
+    with pytest.raises(SystemExit) as stopped:
+        main(["levitate"])
+    assert stopped.value.code == 2
+
+
+def test_bad_input_is_a_message_and_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["info", str(tmp_path / "nothing")]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("wind info: ") and "Traceback" not in told
+    assert main(["info"]) == 2
+
+
+def test_info_shows_topics_rates_station_and_notes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = steady_recording()
+    folder = write_recording(tmp_path / "steady", recording)
+    assert main(["info", str(folder)]) == 0
+    told = capsys.readouterr().out
+    assert "2026-01-01T00:00:00.000Z" in told
+    assert f"{len(recording.pulses['cup'].time)}" in told
+    assert "20 Hz" in told and "0.05 s" in told
+    assert "0.2 m/rad" in told and "nothing unusual" in told
+    (folder / "bag" / "metadata.yaml").unlink()
+    assert main(["info", str(folder)]) == 0
+    assert "metadata.yaml" in capsys.readouterr().out
+    assert main(["info", "mast_cup_vane"]) == 0
+    assert "risoe_cup" in capsys.readouterr().out
+    assert main(["info", "--profiles"]) == 0
+    assert "mitsuta_bivane" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_plot_draws_every_figure_and_keeps_what_is_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording())
+    command = ["plot", str(folder), "-o", str(tmp_path / "figures"), "--format", kind]
+    assert main(command) == 0
+    drawn = {path.stem for path in (tmp_path / "figures").glob(f"*.{kind}")}
+    assert drawn == set(plots.FIGURES)
+    assert all(path.stat().st_size > 5000 for path in (tmp_path / "figures").iterdir())
+    assert main(command) == 2
+    assert "--force" in capsys.readouterr().err
+    assert main([*command, "--force", "--only", "speed"]) == 0
+
+
+def test_figures_are_the_same_every_time(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording())
+    texts = []
+    for name in ("a", "b"):
+        out = tmp_path / name
+        command = ["plot", str(folder), "-o", str(out), "--format", "svg"]
+        assert main([*command, "--only", "speed"]) == 0
+        texts.append((out / "speed.svg").read_text(encoding="utf-8"))
+    assert texts[0] == texts[1]
+
+
+def test_rotor_speed_is_the_calibration() -> None:
+    recording = steady_recording(speed=8.0)
+    cup = recording.station.instrument("cup")
+    assert isinstance(cup, Cup)
+    _, speed = plots.rotor_speed(cup, recording.pulses["cup"])
+    assert np.allclose(speed, 8.0, rtol=1e-6), "a whole turn averages uneven slots away"
+    propeller = Propeller(
+        name="p",
+        pulses=Input(topic="/p"),
+        pulses_per_revolution=1,
+        calibration_distance=0.05,
+        distance_constant=1.0,
+    )
+    time = START + np.arange(5, dtype=np.int64) * 1_000_000_000
+    counted = Pulses(time, np.asarray([0.0, 10.0, 30.0, 30.0, 20.0]))
+    _, speed = plots.rotor_speed(propeller, counted)
+    assert np.allclose(speed, 0.05 * 2.0 * np.pi * np.asarray([10.0, 20.0, 0.0, -10.0]))
+
+
+def test_slot_durations_find_the_planted_slots() -> None:
+    recording = steady_recording()
+    slots, mean, error = plots.slot_durations(recording.pulses["cup"], 4)
+    assert slots.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert np.allclose(mean, SLOTS, atol=1e-6)
+    assert (error < 1e-6).all()
