@@ -16,7 +16,13 @@ from wind_sensors.errors import UserError
 
 
 def open_answers(folder: Path, key: bytes) -> dict[str, Any]:
-    """The answers of a sealed set, after checking them against the commitment.
+    """The answers of a sealed set, after checking them against the commitment."""
+    answers: dict[str, Any] = open_sealed(folder, key)["answers"]
+    return answers
+
+
+def open_sealed(folder: Path, key: bytes) -> dict[str, Any]:
+    """All that was sealed: the answers and how the set was drawn.
 
     Raises UserError if the key is wrong or the answers are not those committed to.
     """
@@ -28,8 +34,8 @@ def open_answers(folder: Path, key: bytes) -> dict[str, Any]:
             str(folder / ANSWERS),
             "Somebody changed the manifest or the answers after sealing.",
         )
-    answers: dict[str, Any] = json.loads(plain)["answers"]
-    return answers
+    found: dict[str, Any] = json.loads(plain)
+    return found
 
 
 def judge_all(folder: Path, answers: dict[str, Any]) -> list[Judged]:

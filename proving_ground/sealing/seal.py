@@ -53,11 +53,19 @@ def seal(
     """
     if folder.exists():
         raise UserError("the folder exists already", str(folder), "Give another one with -o.")
-    rng = np.random.default_rng(int.from_bytes(derive(key, f"plan {seed}"), "big"))
-    plan = make_plan(total, rng, minutes, healthy_count, kinds, strata)
-    names = _names(len(plan.cases), key, seed)
+    drawing = {
+        "total": total,
+        "seed": seed,
+        "minutes": minutes,
+        "healthy_count": healthy_count,
+        "kinds": kinds,
+        "strata": strata,
+    }
+    plan, names = draw(key, drawing)
     answers = _write(folder, plan, names, jobs)
-    plain = json.dumps({"salt": secrets.token_hex(32), "seed": seed, "answers": answers}).encode()
+    plain = json.dumps(
+        {"salt": secrets.token_hex(32), "drawing": drawing, "answers": answers}
+    ).encode()
     committed = commitment(plain)
     groups = {
         name: f"station-{case.station + 1}" for name, case in zip(names, plan.cases, strict=True)
@@ -69,6 +77,21 @@ def seal(
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
     (folder / ANSWERS).write_bytes(encrypt(key, plain))
     return Sealed(folder, committed, len(names))
+
+
+def draw(key: bytes, drawing: dict[str, Any]) -> tuple[Plan, list[str]]:
+    """The plan of a set and the names of its recordings, from the secret and how it was drawn."""
+    seed = int(drawing["seed"])
+    rng = np.random.default_rng(int.from_bytes(derive(key, f"plan {seed}"), "big"))
+    plan = make_plan(
+        int(drawing["total"]),
+        rng,
+        float(drawing["minutes"]),
+        int(drawing["healthy_count"]),
+        str(drawing["kinds"]),
+        drawing["strata"],
+    )
+    return plan, _names(len(plan.cases), key, seed)
 
 
 def _names(count: int, key: bytes, seed: int) -> list[str]:

@@ -53,6 +53,11 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     peers.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     peers.add_argument("--jobs", type=_positive, default=1)
 
+    twins = steps.add_parser("twins", help="misfit removed, against a twin without the cause")
+    twins.add_argument("folder", type=Path, metavar="DIR")
+    twins.add_argument("--key", required=True, metavar="FILE|HEX")
+    twins.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
+
     real = steps.add_parser("real", help="diagnose real records, and doses planted into them")
     real.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
     real.add_argument("--from", dest="local", type=Path, metavar="DIR", help="copies to use")
@@ -73,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         "run": _run,
         "open": _open,
         "peers": _peers,
+        "twins": _twins,
         "real": _real,
         "demo": _demo,
     }
@@ -145,6 +151,14 @@ def _peers(arguments: argparse.Namespace) -> int:
     judged = judge_all(arguments.folder, answers)
     rows = compare(arguments.folder, answers, judged, arguments.jobs)
     print(f"wrote {write_table(arguments.output or arguments.folder / 'score', rows)}")
+    return 0
+
+
+def _twins(arguments: argparse.Namespace) -> int:
+    from proving_ground.scoring.twins import removals, write_removals
+
+    found = removals(arguments.folder, _read_key(arguments.key))
+    print(f"wrote {write_removals(arguments.output or arguments.folder / 'score', found)}")
     return 0
 
 

@@ -19,6 +19,18 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings import read_recording
 
 
+def write_residual(recording: Path, target: Path, station: Path | None = None) -> None:
+    """Write `residual` and `channel` alone, against the recording's station or another file's."""
+    comparison = prepare(read_recording(recording, station))
+    without = comparison.simulate(comparison.station)
+    names = [c.name for c in comparison.channels]
+    np.savez_compressed(
+        target,
+        residual=np.concatenate([comparison.measured.series[n] - without.series[n] for n in names]),
+        channel=np.repeat(np.arange(len(names)), comparison.grid.n),
+    )
+
+
 def write_regressors(recording: Path, target: Path, workers: int = 1) -> None:
     """Write the regressors of a recording.
 
@@ -52,9 +64,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m wind_sensors.report.regressors")
     parser.add_argument("recording", type=Path, metavar="RECORDING")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--residual", action="store_true", help="the residual alone, no signatures")
+    parser.add_argument("--station", type=Path, metavar="FILE", help="with --residual: another one")
     options = parser.parse_args()
     try:
-        write_regressors(options.recording, options.output)
+        if options.residual:
+            write_residual(options.recording, options.output, options.station)
+        else:
+            write_regressors(options.recording, options.output)
     except UserError as problem:
         print(problem, file=sys.stderr)
         return 2
