@@ -159,7 +159,8 @@ def _deck(
             if not able:
                 continue
             if not sizes.get(effect):
-                sizes[effect] = [float(s) for s in rng.permutation(SIZES)]
+                graded = MINIMUM_SIZES[effect].graded
+                sizes[effect] = [float(s) for s in rng.permutation(SIZES)] if graded else [3.0]
             size = sizes[effect].pop()
             yield int(rng.choice(able)), (Planted(str(effect), size),)
 
