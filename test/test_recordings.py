@@ -91,9 +91,7 @@ def full_recording(rng: np.random.Generator) -> Recording:
         },
         reference=Winds(time, rng.normal(size=(50, 3))),
         truth=Winds(time, rng.normal(size=(50, 3))),
-        platform=PlatformStates(
-            time, attitude, *(rng.normal(size=(50, 3)) for _ in range(3))
-        ),
+        platform=PlatformStates(time, attitude, *(rng.normal(size=(50, 3)) for _ in range(3))),
         temperature=Series(time, rng.normal(15.0, 3.0, 50)),
         pressure=Series(time, rng.normal(101_300.0, 300.0, 50)),
     )
@@ -149,8 +147,9 @@ EDGES = START + np.cumsum(np.full(40, 37_000_000, dtype=np.int64))
         Input(topic="/c"),
         Input(topic="/c", type="sensor_msgs/msg/TimeReference"),
         Input(topic="/c", type="std_msgs/Int64MultiArray"),
+        Input(topic="cup/relative"),
     ],
-    ids=lambda source: source.type,
+    ids=lambda source: source.type or source.topic,
 )
 def test_edges_travel_in_every_type_that_carries_times(tmp_path: Path, source: Input) -> None:
     recording = recorded(Station(instruments=(cup(source),)), pulses={"cup": Pulses(EDGES)})
@@ -236,9 +235,7 @@ def test_a_propeller_angle_may_turn_backwards(tmp_path: Path) -> None:
     ],
     ids=["degrees", "adc", "volts", "steps"],
 )
-def test_vanes_in_any_unit(
-    tmp_path: Path, source: Input, angle: float, tolerance: float
-) -> None:
+def test_vanes_in_any_unit(tmp_path: Path, source: Input, angle: float, tolerance: float) -> None:
     time = START + np.arange(5, dtype=np.int64) * 50_000_000
     recording = recorded(
         Station(instruments=(vane(source),)), angles={"vane": Angles(time, np.full(5, angle))}

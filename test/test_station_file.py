@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wind_sensors.errors import UserError
+from wind_sensors.recordings.mapping import mapping_markdown
 from wind_sensors.recordings.station_files import (
     configuration_folder,
     load_station,
@@ -145,8 +146,10 @@ def test_the_printed_reference_documents_every_key() -> None:
         for name, field in model.model_fields.items():
             assert f"| `{name}` |" in text
             assert field.description, f"{model.__name__}.{name} has no description"
-    shipped = Path(__file__).parent.parent / "docs" / "station_file.md"
-    assert shipped.read_text(encoding="utf-8") == text, "run: wind info --schema > docs/..."
+    docs = Path(__file__).parent.parent / "docs"
+    for name, current in (("station", text), ("mapping", mapping_markdown())):
+        shipped = (docs / f"{name}_file.md").read_text(encoding="utf-8")
+        assert shipped == current, f"run: wind info --schema {name} > docs/{name}_file.md"
 
 
 finite = st.floats(0.01, 3.0, allow_nan=False)

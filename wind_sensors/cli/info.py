@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,15 @@ from rich.table import Table
 
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
+from wind_sensors.recordings.mapping import mapping_markdown
 from wind_sensors.recordings.reading import open_recording, signals_of
 from wind_sensors.recordings.station_files import load_station, shipped_profiles
 from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station, Vane
 from wind_sensors.station.reference import schema_markdown
 from wind_sensors.station.signals import Recording, TimeArray
+
+_PLAIN_WIDTH = 120
+"""Of the tables where no terminal says its own."""
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -30,16 +35,18 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--station", metavar="FILE", help="station file of a bag")
     parser.add_argument("--profiles", action="store_true", help="list the instrument profiles")
     parser.add_argument(
-        "--schema", action="store_true", help="write the reference of the station file (Markdown)"
+        "--schema",
+        choices=("station", "mapping"),
+        help="print the reference of station or mapping files (Markdown)",
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print what is there; 0 on success."""
-    console = Console(soft_wrap=False)
+    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
     if options.schema:
-        print(schema_markdown(), end="")
+        print(schema_markdown() if options.schema == "station" else mapping_markdown(), end="")
         return 0
     if options.profiles:
         _print_profiles(console)

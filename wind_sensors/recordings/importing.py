@@ -28,7 +28,7 @@ from wind_sensors.recordings.mapping import (
 from wind_sensors.recordings.raw_topics import BODY_FRAME, running_time
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.writing import write_topics
-from wind_sensors.station.inputs import DEFAULT_FIELDS, FieldPath, field_path, full_type
+from wind_sensors.station.inputs import DEFAULT_FIELDS, FieldPath, absolute, field_path, full_type
 from wind_sensors.station.signals import FloatArray, TimeArray
 
 EARTH_RADIUS = 6_371_008.8
@@ -271,6 +271,7 @@ class _Builder:
         columns: dict[FieldPath, npt.NDArray[Any]],
     ) -> None:
         """Add fields to a topic; instants that lack one of its fields are left out."""
+        topic = absolute(topic)
         content = self._topics.get(topic)
         if content is None:
             template(self._types, message_type, list(columns))

@@ -14,6 +14,7 @@ from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.station.document import Document, parse
 from wind_sensors.station.model import Entry, Station
 from wind_sensors.station.reading import station_of
+from wind_sensors.station.reference import entries_markdown
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -39,6 +40,18 @@ UNITS: dict[str, tuple[float, float]] = {
     "mV": (0.001, 0.0),
 }
 """Factor and offset to the unit of the messages: SI, with degrees Celsius for temperatures."""
+
+
+_INTRODUCTION = """# Mapping file
+
+`wind import FILE... --mapping MAP.yaml -o RECORDING` turns tables (CSV, TOA5, NRG exports; gzip
+too) and NMEA 0183 logs into a recording. The mapping says which column or sentence becomes which
+topic, type and field, in which unit and time zone. Beside the keys of `Mapping` it has `station`,
+a whole station file (see station_file.md), which becomes the recording's. Ready mappings lie in
+`config/mappings`; lines that cannot be read are counted and told.
+
+This page is written by `wind info --schema mapping`.
+"""
 
 
 class Source(Entry):
@@ -95,8 +108,11 @@ class Vector(Entry):
     """A speed and a direction become a wind vector, where the air goes (ENU)."""
 
     topic: str
+    """Topic that gets it."""
     type: str = "geometry_msgs/msg/Vector3Stamped"
+    """ROS message type with a vector."""
     speed: Source
+    """Horizontal speed."""
     direction_from: Source
     """Clockwise from north, where the wind comes from."""
 
@@ -116,17 +132,24 @@ class PlatformSource(Entry):
     """
 
     topic: str = "/platform/odom"
+    """Topic that gets it."""
     heading: Source
+    """Compass heading, clockwise from north [unit: deg]."""
     speed: Source
+    """Speed over ground."""
     course: Source
+    """Course over ground, clockwise from true north [unit: deg]."""
     latitude: Source | None = None
+    """Latitude, with its hemisphere in the next field (NMEA)."""
     longitude: Source | None = None
+    """Longitude, with its hemisphere in the next field (NMEA)."""
 
 
 class TimeColumn(Entry):
     """How a table tells the time."""
 
     column: str = "TIMESTAMP"
+    """Name of the column."""
     format: str = ""
     """As for strptime; empty: ISO 8601."""
     zone: str = "UTC"
@@ -148,11 +171,15 @@ class Mapping(Entry):
     missing: tuple[str, ...] = ("", "NAN", "NaN", "nan", "INF", "-INF", "NULL", "-9999")
     """Texts that stand for no value."""
     time: TimeColumn = TimeColumn()
+    """How a table tells the time."""
     talkers: tuple[str, ...] = ()
     """First letters of the NMEA sentences to take; empty: all."""
     signals: tuple[Signal, ...] = ()
+    """Numbers that become fields of topics."""
     vectors: tuple[Vector, ...] = ()
+    """Speeds with directions that become wind vectors."""
     platform: PlatformSource | None = None
+    """Compass and course of a moving platform (NMEA)."""
 
     @property
     def sources(self) -> list[Source]:
@@ -180,6 +207,11 @@ class MappingFile:
     mapping: Mapping
     station: Station
     station_text: str
+
+
+def mapping_markdown() -> str:
+    """Every entry and key of the mapping file, as Markdown."""
+    return entries_markdown(Mapping, _INTRODUCTION)
 
 
 def read_mapping(text: str, name: str) -> MappingFile:

@@ -7,7 +7,7 @@ import numpy as np
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
 from wind_sensors.recordings.fields import columns, stamps
-from wind_sensors.station.inputs import FieldPath, resolved
+from wind_sensors.station.inputs import FieldPath, absolute, resolved
 from wind_sensors.station.model import Input, Station
 from wind_sensors.station.signals import FloatArray, PlatformStates, TimeArray
 
@@ -80,7 +80,7 @@ def _from_imu(
 
 
 def _topic(source: Input, content: BagContent, notes: list[str]) -> TopicData | None:
-    data = content.topics.get(source.topic)
+    data = content.topics.get(absolute(source.topic))
     if data is None or not data.raw:
         notes.append(f"{source.topic}: no messages (the platform)")
         return None

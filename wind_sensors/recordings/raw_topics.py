@@ -13,6 +13,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.station.inputs import (
     FieldPath,
+    absolute,
     angle_inputs,
     field_path,
     raw_from_angles,
@@ -108,14 +109,15 @@ def _content(
     contents: dict[str, _Content], types: Typestore, source: Input, time: TimeArray, frame: str
 ) -> _Content:
     """The content of the source's topic, new or shared with another signal."""
-    content = contents.get(source.topic)
+    topic = absolute(source.topic)
+    content = contents.get(topic)
     if content is None:
         content = _Content(source.type, time)
         template(types, source.type)
         if "header" in dict(types.fielddefs[source.type][1]):
             content.columns["header", "stamp"] = time
             content.texts["header", "frame_id"] = frame
-        contents[source.topic] = content
+        contents[topic] = content
     elif content.message_type != source.type or not np.array_equal(content.time, time):
         raise UserError(
             "two signals with different types or stamps share one topic.",
@@ -171,7 +173,7 @@ def _edge_batches(source: Input, pulses: Pulses, types: Typestore) -> TopicMessa
         setattr(holder, str(path[-1]), part.astype(np.int64))
         raw.append(bytes(types.serialize_cdr(blank, source.type)))
     last = np.asarray([int(part.max()) for part in parts], dtype=np.int64)
-    return TopicMessages(source.topic, source.type, running_time(last), raw)
+    return TopicMessages(absolute(source.topic), source.type, running_time(last), raw)
 
 
 def _add_winds(

@@ -18,6 +18,7 @@ from wind_sensors.recordings.station_files import load_station
 from wind_sensors.station.inputs import (
     FieldPath,
     Signal,
+    absolute,
     angle_inputs,
     angles_from_raw,
     field_path,
@@ -142,7 +143,7 @@ def station_topics(station: Station) -> set[str]:
 
     def visit(node: object) -> None:
         if isinstance(node, Input):
-            found.add(node.topic)
+            found.add(absolute(node.topic))
         elif isinstance(node, BaseModel):
             for name in type(node).model_fields:
                 visit(getattr(node, name))
@@ -271,7 +272,7 @@ class _SignalReader:
         return Winds(time[keep], scaled(source, raw[keep]))
 
     def _topic(self, source: Input, purpose: str) -> TopicData | None:
-        data = self.content.topics.get(source.topic)
+        data = self.content.topics.get(absolute(source.topic))
         if data is None or not data.raw:
             self.notes.append(f"{source.topic}: no messages ({purpose})")
             return None

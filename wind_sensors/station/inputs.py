@@ -65,6 +65,11 @@ def full_type(name: str) -> str:
     return f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else name
 
 
+def absolute(topic: str) -> str:
+    """The name under which a bag has a topic of the root namespace."""
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
 def resolved(source: Input, signal: Signal) -> Input:
     """The input with type, field and meaning filled in.
 

@@ -22,14 +22,19 @@ that describes a fault is healthy by default. A bare topic name may stand wherev
 expected. `profile: NAME` fills the constants of an instrument from `config/instruments/NAME.yaml`;
 keys that stand beside it win.
 
-This page is written by `wind info --schema`.
+This page is written by `wind info --schema station`.
 """
 
 
 def schema_markdown() -> str:
     """Every entry and key of the station file, as Markdown."""
-    parts = [_INTRODUCTION]
-    for model in _entries(Station):
+    return entries_markdown(Station, _INTRODUCTION)
+
+
+def entries_markdown(root: type[BaseModel], introduction: str) -> str:
+    """An entry and everything below it, as Markdown tables under an introduction."""
+    parts = [introduction]
+    for model in _entries(root):
         kinds = [kind for kind, of in KINDS.items() if of is model]
         title = f"`kind: {kinds[0]}`" if kinds else model.__name__
         parts.append(f"\n## {title}\n\n{' '.join((model.__doc__ or '').split())}\n")
@@ -97,5 +102,6 @@ def _default(field: FieldInfo) -> str:
     if value in ("", ()):
         return "empty"
     if isinstance(value, tuple):
-        return f"`[{', '.join(f'{item:g}' for item in value)}]`"
+        shown = (f"{item:g}" if isinstance(item, float) else f"'{item}'" for item in value)
+        return f"`[{', '.join(shown)}]`"
     return f"`{str(value).lower() if isinstance(value, bool) else value}`"
