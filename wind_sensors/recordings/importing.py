@@ -108,7 +108,7 @@ def import_files(
             ", ".join(str(file) for file in files),
             f"Left out: {describe(faults)}.",
         )
-    builder = _Builder(faults)
+    builder = _Builder(mapping_file.station.recording.frame, faults)
     for signal in mapping.signals:
         builder.add_signal(signal, merged[id(signal)])
     for vector in mapping.vectors:
@@ -185,8 +185,9 @@ def _joined(parts: Sequence[Samples], source: Source, faults: Counter[str]) -> S
 class _Builder:
     """Collects the fields of the messages."""
 
-    def __init__(self, faults: Counter[str]) -> None:
+    def __init__(self, frame: str, faults: Counter[str]) -> None:
         self.faults = faults
+        self._frame = frame
         self.notes: list[str] = []
         self._topics: dict[str, _Topic] = {}
         self._types = typestore()
@@ -249,7 +250,8 @@ class _Builder:
             columns = dict(content.columns)
             if "header" in fields:
                 columns["header", "stamp"] = content.time
-                texts["header", "frame_id"] = "enu" if "twist" in fields else topic.strip("/")
+                earth = {"vector", "twist"} & set(fields)
+                texts["header", "frame_id"] = self._frame if earth else topic.strip("/")
             if "child_frame_id" in fields:
                 texts["child_frame_id",] = BODY_FRAME
             if content.message_type == "sensor_msgs/msg/JointState":
