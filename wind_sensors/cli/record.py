@@ -110,7 +110,6 @@ def show(
     console.print(table)
     for topic, reason in recorder.refused.items():
         console.print(f"not recorded: {topic}: {reason}")
-    wanted = {recorder.resolve_topic_name(topic) for topic in expected}
-    missing = [topic for topic in recorder.missing if topic in wanted]
+    missing = [topic for topic in recorder.missing if topic in expected]
     if missing:
         console.print(f"nobody published: {', '.join(missing)}")

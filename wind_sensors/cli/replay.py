@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
     )
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("replaying", total=None)
+        task = progress.add_task("replaying", total=1.0)
 
         def until() -> bool:
             player = made[0]

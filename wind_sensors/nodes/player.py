@@ -14,7 +14,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import message_class
 from wind_sensors.nodes.outputs import stamp
-from wind_sensors.nodes.quality import advertise, output_quality
+from wind_sensors.nodes.quality import SETTLING, advertise, output_quality
 
 if TYPE_CHECKING:
     from wind_sensors.recordings.bag import BagContent
@@ -95,6 +95,7 @@ class PlayerNode(Node):
         )
         self._next = 0
         self._next_clock = 0
+        self._ready_at = 0.0
         self._started: float | None = None
         self._timer = self.create_timer(
             _TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
@@ -121,6 +122,8 @@ class PlayerNode(Node):
             return
         if self._started is None:
             if any(o.get_subscription_count() < self._waits_for for o in self._outlets):
+                self._ready_at = time.monotonic() + SETTLING
+            if time.monotonic() < self._ready_at:
                 return
             self._started = time.monotonic()
             self._next_clock = int(self._times[0])

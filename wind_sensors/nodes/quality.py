@@ -19,6 +19,10 @@ INPUT_DEPTH = 1000
 
 OUTPUT_DEPTH = 10
 
+SETTLING = 0.3
+"""From the discovery of the last awaited subscriber to the first message [s]: the subscriber may
+see the match a little later than the publisher."""
+
 
 def input_quality(*, reliable: bool = False, depth: int = INPUT_DEPTH) -> QoSProfile:
     """Quality of a raw input.

@@ -64,7 +64,7 @@ class RecorderNode(Node):
         self.refused: dict[str, str] = {}
         self._types = typestore()
         self._wanted = (
-            None if topics is None else {self.resolve_topic_name(topic) for topic in topics}
+            None if topics is None else {self.resolve_topic_name(topic): topic for topic in topics}
         )
         self._folder = Path(folder)
         self._writer = _open_bag(self._folder, station, force=force)
@@ -84,8 +84,9 @@ class RecorderNode(Node):
 
     @property
     def missing(self) -> list[str]:
-        """Wanted topics that nobody publishes yet."""
-        return sorted((self._wanted or set()) - set(self.counts) - set(self.refused))
+        """Topics, as they were given, that nobody publishes yet."""
+        seen = set(self.counts) | set(self.refused)
+        return [name for topic, name in (self._wanted or {}).items() if topic not in seen]
 
     def _subscribe(self, topic: str, types: Sequence[str]) -> None:
         (message_type, *others) = types

@@ -147,9 +147,9 @@ class SignalEncoder:
         turns: list[float] = []
 
         def count(event: Event) -> Iterator[Outgoing]:
-            _, _, time, _, number = event
+            _, _, time, told, number = event
             stamps.append(time)
-            turns.append((number + 1) / rotor.pulses_per_revolution)
+            turns.append(told[0] if told else (number + 1) / rotor.pulses_per_revolution)
             del stamps[:-2], turns[:-2]
             raw = raw_from_turns(source, rotor, np.array(stamps), np.array(turns))
             _set_stamp(message, stamp(time))

@@ -17,7 +17,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.outputs import stamp
 from wind_sensors.nodes.parameters import Parameter, Value, declare, describe
-from wind_sensors.nodes.quality import advertise, output_quality
+from wind_sensors.nodes.quality import SETTLING, advertise, output_quality
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.nodes.signal_messages import SignalEncoder
 from wind_sensors.nodes.station_parameters import (
@@ -90,8 +90,6 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
 
 _TICK = 0.002
 _CLOCK_WALL_PERIOD = 10_000_000
-_SETTLING = 0.3
-"""Wall time between the last awaited subscriber and the first signal [s]."""
 
 
 class SimulatorNode(Node):
@@ -181,7 +179,7 @@ class SimulatorNode(Node):
     def _has_started(self) -> bool:
         if self._started is None:
             if self._lonely_topics():
-                self._ready_at = time.monotonic() + (_SETTLING if self._waits_for else 0.0)
+                self._ready_at = time.monotonic() + SETTLING
             elif time.monotonic() >= self._ready_at:
                 self._start()
         return self._started is not None

@@ -1,0 +1,86 @@
+"""Executables as a launcher sees them: exit codes, help, mistakes on the command line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from wind_sensors.nodes.outputs import TOPICS
+
+ESTIMATORS = ("cup_vane_node", "propeller_vane_node", "propeller_array_node", "bivane_node")
+
+
+def _start(node: str, tmp_path: Path, *arguments: str) -> subprocess.Popen[str]:
+    code = f"import sys; from wind_sensors.nodes.{node} import main; sys.exit(main(sys.argv[1:]))"
+    environment = os.environ | {
+        "ROS_LOG_DIR": str(tmp_path),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": str(100 + os.getpid() % 100),
+    }
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("node", ["cup_vane_node", "sim_node"])
+def test_every_way_to_stop_it_ends_with_status_zero(node: str, tmp_path: Path) -> None:
+    cases: list[tuple[float, Sequence[signal.Signals]]] = [
+        (0.7, [signal.SIGINT]),
+        (1.4, [signal.SIGTERM]),
+        (2.0, [signal.SIGINT, signal.SIGINT]),
+        (6.0, [signal.SIGINT]),
+        (6.0, [signal.SIGINT, signal.SIGINT]),
+        (6.0, [signal.SIGTERM]),
+    ]
+    station = ["--ros-args", "-p", "station:=mast_cup_vane"]
+    begin = time.monotonic()
+    running = [_start(node, tmp_path, *station) for _ in cases]
+    for process, (delay, signals) in zip(running, cases, strict=True):
+        time.sleep(max(0.0, begin + delay - time.monotonic()))
+        for number in signals:
+            process.send_signal(number)
+    for process, case in zip(running, cases, strict=True):
+        _, errors = process.communicate(timeout=30)
+        assert process.returncode == 0, f"{case}: {errors}"
+        assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("node", ESTIMATORS)
+def test_help_lists_topics_and_parameters(node: str, tmp_path: Path) -> None:
+    output, _ = _start(node, tmp_path, "--help").communicate(timeout=60)
+    for topic in TOPICS:
+        assert topic in output
+    assert "smoother_lag" in output
+    assert "distance_constant" in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--ros-args", "-p", "station:=nowhere.yaml"], "no such station file"),
+        (["--ros-args", "-p", "output_rate:=0"], "'output_rate' must be at least 0.1"),
+        (["--ros-args", "-p", "broken"], "--ros-args"),
+        ([], "calibration_distance"),
+    ],
+)
+def test_mistakes_end_with_status_two_and_a_sentence(
+    arguments: list[str], told: str, tmp_path: Path
+) -> None:
+    process = _start("cup_vane_node", tmp_path, *arguments)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert told in errors
+    assert "Traceback" not in errors

@@ -1,0 +1,204 @@
+"""Messages of every kind become the numbers that a recording of them would hold."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Header
+
+from wind_sensors.errors import UserError
+from wind_sensors.nodes.inputs import EstimatorInputs
+from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
+from wind_sensors.nodes.signal_messages import SignalEncoder
+from wind_sensors.recordings import load_station
+from wind_sensors.recordings.bag import BagContent, TopicData, typestore
+from wind_sensors.recordings.reading import signals_of
+from wind_sensors.simulation.run import SignalStream
+from wind_sensors.simulation.transport import live_events
+from wind_sensors.station.model import Station
+
+CUP = "{name: cup, profile: risoe_cup, pulses_per_revolution: 2, pulses: %s}"
+VANE = "{name: vane, kind: vane, joint_states: %s, distance_constant: 0.5, damping_ratio: 0.4}"
+BIVANE = (
+    "{name: bivane, kind: bivane, azimuth: /b, elevation: /b, speed: cup, "
+    "distance_constant: 0.7, damping_ratio: 0.5}"
+)
+SECONDS = 8.0
+
+
+class Collector:
+    """Stands in for an estimator and keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.pulses: dict[str, list[tuple[int, float | None]]] = defaultdict(list)
+        self.angles: dict[str, list[tuple[int, float]]] = defaultdict(list)
+        self.platform: list[tuple[Any, ...]] = []
+        self.air: list[tuple[int, float | None, float | None]] = []
+
+    def add_pulse(self, name: str, time_ns: int, turns: float | None = None) -> None:
+        self.pulses[name].append((time_ns, turns))
+
+    def add_angle(self, name: str, time_ns: int, angle: float) -> None:
+        self.angles[name].append((time_ns, angle))
+
+    def add_platform(self, *state: Any) -> None:
+        self.platform.append(state)
+
+    def add_air(
+        self, time_ns: int, temperature: float | None = None, pressure: float | None = None
+    ) -> None:
+        self.air.append((time_ns, temperature, pressure))
+
+
+def _station(tmp_path: Path, *instruments: str, more: str = "") -> Station:
+    file = tmp_path / "station.yaml"
+    lines = "".join(f"- {line}\n" for line in instruments)
+    file.write_text(f"instruments:\n{lines}{more}", encoding="utf-8")
+    return load_station(file)
+
+
+def _through(station: Station) -> tuple[Collector, Any, EstimatorInputs]:
+    """The same messages through the node's inputs and through a bag's reader."""
+    values = {parameter.name: parameter.default for parameter in SCENARIO_PARAMETERS}
+    if station.platform is not None:
+        values |= {"carrier": "boat", "carrier_speed": 2.0}
+    stream = SignalStream(station, scenario_of(values, station), start=10**18)
+    encoder = SignalEncoder(station, "map", with_truth=False)
+    now = [0]
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: now[0])
+    receivers = {source.topic: source.receive for source in inputs.sources()}
+    topics: dict[str, TopicData] = {}
+    for event in live_events(stream):
+        if event.arrival > stream.start + SECONDS * 1e9:
+            break
+        now[0] = event.arrival
+        for topic, message in encoder.encode(event):
+            kind = type(message)
+            name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+            data = topics.setdefault(topic, TopicData(name))
+            data.log_time.append(event.arrival)
+            data.raw.append(serialize_message(message))
+            if topic in receivers:
+                receivers[topic](deserialize_message(data.raw[-1], kind))
+    offline = signals_of(BagContent(topics, typestore()), station, "test", "test")
+    return heard, offline, inputs
+
+
+@pytest.mark.parametrize(
+    "pulses",
+    [
+        "/p",
+        "{topic: /p, type: sensor_msgs/msg/TimeReference}",
+        "{topic: /p, type: std_msgs/msg/Int64MultiArray}",
+        "{topic: /p, type: std_msgs/msg/Int16, modulus: 16}",
+        "{topic: /p, type: std_msgs/msg/Float32}",
+        "{topic: /p, type: sensor_msgs/msg/JointState}",
+        "{topic: /p, type: std_msgs/msg/Float64, meaning: value, scale: 0.514444}",
+    ],
+)
+def test_pulses_of_every_type_arrive_as_in_a_recording(tmp_path: Path, pulses: str) -> None:
+    station = _station(tmp_path, CUP % pulses, VANE % "/v")
+    heard, offline, _ = _through(station)
+    times = [time for time, _ in heard.pulses["cup"]]
+    assert len(times) > 40
+    np.testing.assert_array_equal(times, offline.pulses["cup"].time)
+    if offline.pulses["cup"].turns is None:
+        assert all(turns is None for _, turns in heard.pulses["cup"])
+    else:
+        turns = [turns for _, turns in heard.pulses["cup"]]
+        np.testing.assert_array_equal(turns, offline.pulses["cup"].turns)
+
+
+@pytest.mark.parametrize(
+    "angle",
+    [
+        "/v",
+        "{topic: /v, type: std_msgs/msg/Float64, scale: 0.017453292519943295}",
+        "{topic: /v, type: std_msgs/msg/UInt16, scale: 0.00613592315, offset: -3.14159265}",
+        "{topic: /v, type: std_msgs/msg/Float32, "
+        "steps: [[0.5, 0], [1.5, 90], [2.5, 180], [3.5, 270]]}",
+    ],
+)
+def test_angles_in_every_unit_arrive_as_in_a_recording(tmp_path: Path, angle: str) -> None:
+    heard, offline, _ = _through(_station(tmp_path, CUP % "/p", VANE % angle))
+    times, angles = zip(*heard.angles["vane"], strict=True)
+    np.testing.assert_array_equal(times, offline.angles["vane"].time)
+    np.testing.assert_array_equal(angles, offline.angles["vane"].angle)
+    assert len(angles) > 100
+
+
+def test_a_bivane_on_one_topic_delivers_azimuth_and_elevation(tmp_path: Path) -> None:
+    heard, offline, _ = _through(_station(tmp_path, CUP % "/p", BIVANE))
+    for name in ("bivane", "bivane/elevation"):
+        angles = [angle for _, angle in heard.angles[name]]
+        np.testing.assert_array_equal(angles, offline.angles[name].angle)
+    assert np.std([angle for _, angle in heard.angles["bivane/elevation"]]) > 0.01
+
+
+def test_odometry_arrives_as_in_a_recording(tmp_path: Path) -> None:
+    more = "platform: {odometry: /odom}\n"
+    heard, offline, _ = _through(_station(tmp_path, CUP % "/p", VANE % "/v", more=more))
+    time, attitude, velocity, rate, position = (
+        np.array(part) for part in zip(*heard.platform, strict=True)
+    )
+    np.testing.assert_array_equal(time, offline.platform.time)
+    np.testing.assert_array_equal(attitude, offline.platform.attitude)
+    np.testing.assert_array_equal(velocity, offline.platform.velocity)
+    np.testing.assert_array_equal(rate, offline.platform.angular_rate)
+    np.testing.assert_array_equal(position, offline.platform.position)
+
+
+def test_imu_waits_for_the_velocity_around_it(tmp_path: Path) -> None:
+    more = "platform: {imu: /imu, twist: /velocity}\n"
+    heard, offline, _ = _through(_station(tmp_path, CUP % "/p", VANE % "/v", more=more))
+    time = np.array([state[0] for state in heard.platform])
+    velocity = np.array([state[2] for state in heard.platform])
+    np.testing.assert_array_equal(time, offline.platform.time[: len(time)])
+    np.testing.assert_allclose(velocity, offline.platform.velocity[: len(time)], rtol=0, atol=1e-12)
+    assert len(time) >= len(offline.platform.time) - 1
+
+
+def test_air_arrives_with_its_units(tmp_path: Path) -> None:
+    more = "air: {temperature: {topic: /t, offset: -273.15}, pressure: /q}\n"
+    heard, offline, _ = _through(_station(tmp_path, CUP % "/p", VANE % "/v", more=more))
+    temperatures = [value for _, value, _ in heard.air if value is not None]
+    pressures = [value for _, _, value in heard.air if value is not None]
+    np.testing.assert_array_equal(temperatures, offline.temperature.value)
+    np.testing.assert_array_equal(pressures, offline.pressure.value)
+
+
+def test_edges_without_a_stamp_are_left_out_and_counted(tmp_path: Path) -> None:
+    station = _station(tmp_path, CUP % "/p", VANE % "/v")
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: 5)
+    receive = {source.topic: source.receive for source in inputs.sources()}["/p"]
+    receive(Header())
+    assert not heard.pulses
+    assert inputs.counts["/p"].without_stamp == 1
+    (told,) = [s for s in inputs.statuses() if s.name == "topic /p"]
+    assert "1 without a stamp" in told.message
+
+
+def test_a_field_that_does_not_exist_is_the_users_error(tmp_path: Path) -> None:
+    wrong = "{topic: /v, type: std_msgs/msg/Float64, field: angle}"
+    station = _station(tmp_path, CUP % "/p", VANE % wrong)
+    collector: Any = Collector()
+    with pytest.raises(UserError, match="no field 'angle'"):
+        EstimatorInputs(station, collector, lambda: 0)
+
+
+def test_a_type_that_is_not_installed_is_the_users_error(tmp_path: Path) -> None:
+    wrong = "{topic: /v, type: weather_msgs/msg/Vane, field: angle}"
+    station = _station(tmp_path, CUP % "/p", VANE % wrong)
+    collector: Any = Collector()
+    with pytest.raises(UserError, match="weather_msgs"):
+        EstimatorInputs(station, collector, lambda: 0)

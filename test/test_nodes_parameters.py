@@ -1,0 +1,182 @@
+"""Parameters, quality of service and diagnostics of the nodes, seen from outside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from diagnostic_msgs.msg import DiagnosticArray
+from nodes_harness import Graph, overrides, status, values
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSReliabilityPolicy
+from std_msgs.msg import String
+
+from wind_sensors.errors import UserError
+from wind_sensors.nodes.estimator_node import EstimatorNode
+from wind_sensors.nodes.kinds import BIVANE, CUP_VANE, PROPELLER_VANE
+from wind_sensors.nodes.parameters import Parameter
+from wind_sensors.nodes.simulator import SimulatorNode
+
+
+@pytest.fixture
+def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    made = Graph(tmp_path, monkeypatch)
+    yield made
+    made.close()
+
+
+def _estimator(graph: Graph, **parameters: Any) -> Any:
+    parameters = {"station": "mast_cup_vane", **parameters}
+    return graph.add(EstimatorNode, kind=CUP_VANE, parameter_overrides=overrides(**parameters))
+
+
+def _set(node: Any, **changes: Any) -> Any:
+    return node.set_parameters_atomically(overrides(**changes))
+
+
+def test_whole_numbers_are_welcome_where_a_fraction_is_meant(graph: Graph) -> None:
+    node = _estimator(graph, output_rate=5)
+    assert _set(node, smoother_lag=2).successful
+
+
+def test_changes_at_run_time_take_effect_or_say_why_not(graph: Graph) -> None:
+    node = _estimator(graph)
+    assert _set(node, method="inverse", bandwidth=0.5).successful
+    assert _set(node, **{"cup.calibration_distance": 0.25}).successful
+    assert node.station.instrument("cup").calibration_distance == 0.25
+    for change, reason in (
+        ({"method": "guess"}, "kalman"),
+        ({"output_rate": 1000.0}, "200"),
+        ({"output_rate": float("nan")}, ""),
+        ({"cup.distance_constant": -1.0}, ""),
+        ({"cup.distance_constant": 0.0}, "above 0"),
+        ({"input_depth": 5}, "read-only"),
+        ({"cup.pulses.topic": "/elsewhere"}, "read-only"),
+        ({"nmea_talker": 7}, "text"),
+    ):
+        result = _set(node, **change)
+        assert not result.successful
+        assert reason in result.reason
+    assert node.station.instrument("cup").distance_constant == 1.7
+
+
+def test_parameters_show_the_constants_of_file_and_profile(graph: Graph) -> None:
+    node = _estimator(graph)
+    assert node.get_parameter("cup.calibration_distance").value == 0.2
+    assert node.get_parameter("vane.damping_ratio").value == 0.38
+    descriptor = node.describe_parameter("cup.distance_constant")
+    assert "[m]" in descriptor.description
+
+
+def test_parameters_alone_make_a_station(graph: Graph) -> None:
+    node = _estimator(
+        graph,
+        station="",
+        **{
+            "cup.profile": "risoe_cup",
+            "cup.pulses_per_revolution": 3,
+            "vane.distance_constant": 1,
+            "vane.damping_ratio": 0.4,
+        },
+    )
+    cup = node.station.instrument("cup")
+    assert (cup.pulses_per_revolution, cup.calibration_distance) == (3, 0.2)
+    assert node.topics == {"/cup/pulses", "/vane/joint_states"}
+
+
+def test_a_missing_constant_is_named(graph: Graph) -> None:
+    with pytest.raises(UserError, match="damping_ratio"):
+        _estimator(graph, station="", **{"cup.profile": "risoe_cup"})
+
+
+@pytest.mark.parametrize("kind", [PROPELLER_VANE, BIVANE])
+def test_a_node_refuses_a_station_without_its_instrument(graph: Graph, kind: Any) -> None:
+    with pytest.raises(UserError, match=f"{kind.name} needs a"):
+        graph.add(EstimatorNode, kind=kind, parameter_overrides=overrides(station="mast_cup_vane"))
+
+
+def test_raw_inputs_are_best_effort_and_outputs_reliable_unless_overridden(graph: Graph) -> None:
+    node = _estimator(
+        graph, **{"qos_overrides./vane/joint_states.subscription.reliability": "reliable"}
+    )
+    (pulses,) = node.get_subscriptions_info_by_topic("/cup/pulses")
+    assert pulses.qos_profile.reliability == QoSReliabilityPolicy.BEST_EFFORT
+    (angles,) = node.get_subscriptions_info_by_topic("/vane/joint_states")
+    assert angles.qos_profile.reliability == QoSReliabilityPolicy.RELIABLE
+    (wind,) = node.get_publishers_info_by_topic("/wind")
+    assert wind.qos_profile.reliability == QoSReliabilityPolicy.RELIABLE
+    assert node.get_parameter("qos_overrides./wind.publisher.depth").value == 10
+    assert node.get_parameter("qos_overrides./cup/pulses.subscription.depth").value >= 100
+
+
+def test_a_namespace_moves_every_relative_topic(graph: Graph) -> None:
+    node = graph.add(
+        EstimatorNode,
+        kind=CUP_VANE,
+        namespace="/mast",
+        parameter_overrides=overrides(
+            **{
+                "cup.profile": "risoe_cup",
+                "cup.pulses_per_revolution": 2,
+                "vane.distance_constant": 0.5,
+                "vane.damping_ratio": 0.4,
+            }
+        ),
+    )
+    assert node.topics == {"/mast/cup/pulses", "/mast/vane/joint_states"}
+    assert node.count_publishers("/mast/wind") == 1
+    assert node.count_publishers("/diagnostics") == 1
+
+
+def test_an_input_nobody_publishes_is_a_warning_that_names_the_topic(graph: Graph) -> None:
+    listener = graph.listener()
+    diagnostics = graph.listen(listener, DiagnosticArray, "/diagnostics")
+    _estimator(graph, diagnostics_period=0.05)
+    graph.spin(lambda: status(diagnostics, "topic /cup/pulses") is not None)
+    found = status(diagnostics, "topic /cup/pulses")
+    assert found.level == b"\x01"
+    assert values(found)["purpose"] == "pulses of cup"
+
+
+def test_marine_sentences_flow_when_asked_for(graph: Graph) -> None:
+    listener = graph.listener()
+    sentences = graph.listen(listener, String, "/wind/nmea")
+    _estimator(graph, nmea=True, nmea_rate=20.0, smoother_lag=0.1, use_sim_time=False)
+    graph.add(
+        SimulatorNode,
+        parameter_overrides=overrides(
+            station="mast_cup_vane", speed=10.0, direction_from=0.0, wait_for_subscribers=1
+        ),
+    )
+    graph.spin(lambda: len(sentences) >= 4)
+    assert {message.data[:6] for message in sentences[:2]} == {"$WIMWV", "$WIMWD"}
+
+
+@pytest.mark.parametrize(
+    ("parameter", "good", "bad"),
+    [
+        (Parameter("x", float, 1.0, "", minimum=0.0), 3, -1.0),
+        (Parameter("x", float, 1.0, ""), 2.5, "2.5"),
+        (Parameter("x", float, 1.0, ""), 2.5, float("inf")),
+        (Parameter("x", int, 1, "", maximum=5), 5, 6),
+        (Parameter("x", int, 1, ""), 5, 1.5),
+        (Parameter("x", bool, True, ""), False, 1),
+        (Parameter("x", str, "a", "", choices=("a", "b")), "b", "c"),
+        (Parameter("x", tuple, (), ""), [1, 2.5], "12"),
+        (Parameter("x", float, None, ""), None, True),
+        (Parameter("x", float, 1.0, ""), 1.0, None),
+    ],
+)
+def test_a_parameter_accepts_its_own_kind_only(parameter: Any, good: Any, bad: Any) -> None:
+    assert parameter.accept(good) == (tuple(good) if isinstance(good, list) else good)
+    with pytest.raises(ValueError, match="'x'"):
+        parameter.accept(bad)
+
+
+def test_ros_parameters_of_an_unknown_node_do_not_disturb(graph: Graph) -> None:
+    node = _estimator(graph)
+    assert node.set_parameters([RosParameter("use_sim_time", value=False)])[0].successful
