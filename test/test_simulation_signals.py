@@ -371,3 +371,25 @@ def test_hashed_numbers_are_uniform_and_independent():
     n = random_numbers.normal(1, "n", index)
     assert abs(n.mean()) < 0.01 and abs(n.std() - 1.0) < 0.01
     assert np.mean(n**4) == pytest.approx(3.0, rel=0.05)
+
+
+def test_a_shaft_angle_tells_which_way_a_propeller_turns() -> None:
+    """A propeller blown backwards and forwards again: the angle goes back as the rotor does."""
+    propeller = Propeller.model_validate(
+        {
+            "name": "propeller", "pulses": {"topic": "p", "type": "sensor_msgs/msg/JointState"},
+            "pulses_per_revolution": 6, "calibration_distance": 0.05, "distance_constant": 1.0,
+            "axis": (1.0, 0.0, 0.0),
+        }
+    )  # fmt: skip
+    t = np.arange(401) * 0.05
+    wind = np.stack([6.0 * np.sin(2.0 * np.pi * t / 10.0), np.zeros(401), np.zeros(401)], axis=1)
+    response = respond(Station(instruments=(propeller,)), Drive(START, 0.05, wind))
+    told = PulseCircuit("propeller", START, 0).signals(response)
+    assert told.turns is not None
+    psi = np.interp(seconds(told.time), t, response.rotors["propeller"].psi_on_grid)
+    np.testing.assert_allclose(2.0 * np.pi * told.turns, psi, atol=0.3)
+    steps = np.diff(told.turns) * 6.0
+    np.testing.assert_allclose(np.abs(steps[steps != 0.0]), 1.0)
+    assert np.count_nonzero(steps < 0.0) > 100
+    assert np.count_nonzero(steps > 0.0) > 100

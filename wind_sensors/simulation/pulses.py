@@ -12,7 +12,9 @@ from wind_sensors.errors import UserError
 from wind_sensors.simulation import random_numbers
 from wind_sensors.simulation.clocks import stamps
 from wind_sensors.simulation.response import Response
+from wind_sensors.station.inputs import resolved
 from wind_sensors.station.model import Rotor
+from wind_sensors.station.signals import Pulses
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -147,9 +149,38 @@ class PulseCircuit:
 
     def edges(self, response: Response) -> TimeArray:
         """Stamps of the edges that the logger records in a response [ns], in order of time."""
+        parts = [
+            self._recorded(rotor, times, numbers, end)
+            for rotor, times, numbers, end in self._passed(response)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def signals(self, response: Response) -> Pulses:
+        """What the logger records: edges, or the shaft's angle whenever it passes a slot.
+
+        Only a shaft angle tells which way the rotor turns. Its source knows neither dead time nor
+        bounces; messages can be lost.
+        """
+        rotor = response.station.instrument(self._name)
+        assert isinstance(rotor, Rotor)
+        if resolved(rotor.pulses, "pulses").meaning != "angle":
+            return Pulses(self.edges(response))
+        time, turns = [], []
+        for now, times, numbers, _ in self._passed(response):
+            kept = ~self._silent(now, times)
+            if now.electronics.loss_probability > 0.0:
+                kept &= self._drawn("loss", numbers) >= now.electronics.loss_probability
+            time.append(stamps(now.clock, times[kept], self._origin))
+            turns.append(numbers[kept] / now.pulses_per_revolution)
+        return Pulses(np.concatenate(time), np.concatenate(turns))
+
+    def _passed(
+        self, response: Response
+    ) -> list[tuple[Rotor, TimeArray, npt.NDArray[np.int64], int]]:
+        """Of each stretch: the rotor, when slots passed [ns], their numbers, the end [ns]."""
         movement = response.rotors[self._name]
         drive = response.drive
-        parts = []
+        out = []
         for stretch in response.stretches:
             rotor = stretch.segment.station.instrument(self._name)
             assert isinstance(rotor, Rotor)
@@ -160,8 +191,16 @@ class PulseCircuit:
             seconds = seconds + stretch.first * drive.dt
             times = drive.start_ns + np.rint(seconds * 1e9).astype(np.int64)
             end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
-            parts.append(self._recorded(rotor, times, numbers, end))
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+            out.append((rotor, times, numbers, end))
+        return out
+
+    def _silent(self, rotor: Rotor, times: TimeArray) -> npt.NDArray[np.bool_]:
+        """Which times lie in an outage."""
+        since = (times - self._origin) * 1e-9
+        silent = np.zeros(times.size, dtype=np.bool_)
+        for outage in rotor.outages:
+            silent |= (since >= outage.start) & (since < outage.stop)
+        return silent
 
     def _drawn(self, purpose: str, numbers: npt.NDArray[np.int64]) -> FloatArray:
         return random_numbers.uniform(self._seed, f"{self._name}/{purpose}", numbers)
@@ -184,9 +223,7 @@ class PulseCircuit:
             times = times[_after_dead_time(times, round(electronics.dead_time * 1e9), self._last)]
         if times.size:
             self._last = int(times[-1])
-        for outage in rotor.outages:
-            since = (times - self._origin) * 1e-9
-            times = times[(since < outage.start) | (since >= outage.stop)]
+        times = times[~self._silent(rotor, times)]
         return stamps(rotor.clock, times, self._origin)
 
 

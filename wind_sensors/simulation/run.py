@@ -30,7 +30,6 @@ from wind_sensors.station.model import Angle, Bivane, Rotor, Station
 from wind_sensors.station.signals import (
     Angles,
     PlatformStates,
-    Pulses,
     Recording,
     Series,
     TimeArray,
@@ -180,7 +179,7 @@ class SignalStream:
         return SignalBlock(
             start=drive.start_ns,
             stop=self._at(end),
-            pulses={n: Pulses(c.edges(response)) for n, c in self._circuits.items()},
+            pulses={n: c.signals(response) for n, c in self._circuits.items()},
             angles={n: self._angles(n, response, begin, end) for n in self._encoders},
             reference=reference,
             platform=None if motion is None else self._platform(response, motion, begin, end),

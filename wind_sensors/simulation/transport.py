@@ -39,9 +39,9 @@ class Event(NamedTuple):
         source: `pulses/<rotor>`, `angles/<vane>` (`angles/<bivane>/elevation`), `reference`,
             `platform`, `temperature`, `pressure`, `truth`.
         stamp: The message's time stamp [ns].
-        values: Nothing for an edge; the angle [rad]; wind east, north, up [m/s]; attitude (x, y,
-            z, w), velocity, angular rate and position of the platform; a temperature [deg C] or
-            pressure [Pa].
+        values: Nothing for an edge, revolutions where the source tells a shaft's angle; a vane's
+            angle [rad]; wind east, north, up [m/s]; attitude (x, y, z, w), velocity, angular rate
+            and position of the platform; a temperature [deg C] or pressure [Pa].
         number: Running number of the message from its source, from 0; one less than what a pulse
             counter shows, wrapped where the faults say so.
     """
@@ -137,7 +137,10 @@ def _platform_values(states: PlatformStates) -> FloatArray:
 
 def _sources(block: SignalBlock) -> Iterator[tuple[str, TimeArray, FloatArray]]:
     for name, pulses in block.pulses.items():
-        yield f"pulses/{name}", pulses.time, np.empty((pulses.time.size, 0))
+        told = np.empty((pulses.time.size, 0))
+        if pulses.turns is not None:
+            told = pulses.turns[:, np.newaxis]
+        yield f"pulses/{name}", pulses.time, told
     for name, angles in block.angles.items():
         yield f"angles/{name}", angles.time, angles.angle[:, np.newaxis]
     if block.reference is not None:
@@ -216,7 +219,9 @@ def received(recording: Recording, faults: TransportFaults) -> Recording:
         events = by_source.get(f"pulses/{name}", [])
         rotor = recording.station.instrument(name)
         turns = None
-        if isinstance(rotor, Rotor) and rotor.pulses.meaning in {"count", "angle"}:
+        if recording.pulses[name].turns is not None:
+            turns = columns(f"pulses/{name}", 1)[1][:, 0]
+        elif isinstance(rotor, Rotor) and rotor.pulses.meaning == "count":
             numbers = np.array([e.number for e in events], dtype=np.float64)
             turns = (numbers + 1.0) / rotor.pulses_per_revolution
         pulses[name] = Pulses(_stamps_of(events), turns)
