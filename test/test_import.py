@@ -80,6 +80,7 @@ def test_toa5_becomes_a_reference_wind(tmp_path: Path) -> None:
     assert recording.reference is not None
     first = nanoseconds("2012-06-07T12:45:00.05")
     assert recording.reference.time.tolist() == [first, first + 100_000_000]
+    assert recording.station.recording.start == "2012-06-07T12:45:00.050Z"
     assert recording.reference.velocity.tolist() == [[2.5, -1.5, -0.25], [3.0, -1.0, 0.5]]
     assert recording.pressure is not None
     assert np.allclose(recording.pressure.value, 100_200.0)

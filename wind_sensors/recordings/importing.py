@@ -121,8 +121,14 @@ def import_files(
 def write_imported(
     folder: Path, imported: Imported, mapping_file: MappingFile, *, force: bool = False
 ) -> Path:
-    """Write what was imported as a recording; its station file is the mapping's `station`."""
-    return write_topics(folder, mapping_file.station_text, imported.topics, force=force)
+    """Write what was imported as a recording.
+
+    Its station file is the mapping's `station` with the first stamp as `recording.start`.
+    """
+    first = min(int(topic.time[0]) for topic in imported.topics)
+    start = f"{np.datetime_as_string(np.datetime64(first, 'ns'), unit='ms')}Z"
+    text = mapping_file.station_text_with_start(start)
+    return write_topics(folder, text, imported.topics, force=force)
 
 
 def describe(faults: Counter[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from io import StringIO
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 from ruamel.yaml import YAML
@@ -208,6 +208,12 @@ class MappingFile:
     station: Station
     station_text: str
 
+    def station_text_with_start(self, start: str) -> str:
+        """The station's text with `recording.start` set."""
+        loaded = YAML(typ="rt").load(self.station_text)
+        loaded.setdefault("recording", {})["start"] = start
+        return _dumped(loaded)
+
 
 def mapping_markdown() -> str:
     """Every entry and key of the mapping file, as Markdown."""
@@ -240,8 +246,12 @@ def read_mapping(text: str, name: str) -> MappingFile:
             message = detail["msg"].removeprefix("Value error, ")
             faults.append(f"\n  {document.where(path)}: {key}: {message}.")
         raise UserError(f"{len(faults)} problems:{''.join(faults)}", name) from None
+    return MappingFile(mapping, station, _dumped(YAML(typ="rt").load(text)["station"]))
+
+
+def _dumped(node: Any) -> str:
     stream = StringIO()
     yaml = YAML(typ="rt")
     yaml.width = 100
-    yaml.dump(yaml.load(text)["station"], stream)
-    return MappingFile(mapping, station, stream.getvalue())
+    yaml.dump(node, stream)
+    return stream.getvalue()
