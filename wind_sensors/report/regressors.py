@@ -20,7 +20,10 @@ from wind_sensors.recordings import read_recording
 
 
 def write_residual(recording: Path, target: Path, station: Path | None = None) -> None:
-    """Write `residual` and `channel` alone, against the recording's station or another file's."""
+    """Write `residual`, `channel` and the slow apparent `speed` [m/s] alone.
+
+    The residual is against the recording's own station, or another file's.
+    """
     comparison = prepare(read_recording(recording, station))
     without = comparison.simulate(comparison.station)
     names = [c.name for c in comparison.channels]
@@ -28,6 +31,7 @@ def write_residual(recording: Path, target: Path, station: Path | None = None) -
         target,
         residual=np.concatenate([comparison.measured.series[n] - without.series[n] for n in names]),
         channel=np.repeat(np.arange(len(names)), comparison.grid.n),
+        speed=comparison.speed,
     )
 
 
