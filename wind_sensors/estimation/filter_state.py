@@ -43,7 +43,7 @@ class FilterState(NamedTuple):
         slot_interval: Time per slot before that edge, lost edges counted [s]; 0 before the first.
         edge_count: Edges since the start, lost ones included.
         rejected: Consecutive rejections of each rotor.
-        tally: By rotor: accepted, lost, extra, found again; shape (rotors, 4).
+        tally: By rotor: accepted, lost, extra, wind found again; shape (rotors, 4).
         innovation: Running sum of squared normalised innovations and their number (rotors, then
             vanes), shape (rotors + vanes, 2).
         height: Above the ground [m], shape (1,).

@@ -11,7 +11,6 @@ from wind_sensors.estimation import forward
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
 from wind_sensors.estimation.constants import instruments_of, rotors_of, vanes_of
 from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
-from wind_sensors.estimation.filter_kernel import wind_of
 from wind_sensors.estimation.filter_state import (
     EDGE,
     LARGEST_SLOTS,
@@ -33,6 +32,7 @@ from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.smoother_kernel import smooth
 from wind_sensors.estimation.start import start_filter
 from wind_sensors.estimation.turbulence_process import UNRESOLVED_VARIANCE, WIND_STATES
+from wind_sensors.estimation.wind_state import wind_of
 from wind_sensors.station.changes import Segment, segments
 from wind_sensors.station.model import Cup, Propeller, Station, Vane
 

@@ -25,12 +25,13 @@ def kalman_health(core: KalmanCore) -> list[HealthItem]:
     rotors = len(core.rotor_names)
     ratios = f.innovation[:, 0] / np.maximum(f.innovation[:, 1], 1.0)
     for i, name in enumerate(core.rotor_names):
-        accepted, lost, extra, _ = (int(v) for v in f.tally[i])
+        accepted, lost, extra, regained = (int(v) for v in f.tally[i])
         values = {
             "edges": str(accepted),
             "lost edges": str(lost),
             "extra edges": str(extra),
             "implausible edges": str(int(f.outliers[i])),
+            "wind found again": str(regained),
             "edge scatter": f"{np.sqrt(f.edge_variance[i]):.4f} slots",
             "speed l s": f"{f.mean[WIND_STATES + 2 * i]:.2f} m/s",
             "normalised innovation": f"{ratios[i]:.2f}",

@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
-from wind_sensors.estimation.filter_kernel import (
+from wind_sensors.estimation.correction_kernel import (
     correct_by_edge,
     correct_by_reading,
     correct_by_silence,
     correct_by_turns,
-    predict,
 )
 from wind_sensors.estimation.filter_state import EDGE, READING, TURNS, FilterState, Ring
 from wind_sensors.estimation.forward import Instruments
+from wind_sensors.estimation.prediction_kernel import predict
 from wind_sensors.estimation.smoother_kernel import smooth
 from wind_sensors.estimation.turbulence_process import WIND_STATES
 
@@ -139,7 +139,7 @@ def run(
         if this == READING:
             correct_by_reading(f, s, ring, at, which, value[i], extra[i])
         elif this == EDGE:
-            correct_by_edge(f, ring, at, which, time[i])
+            correct_by_edge(f, s, ring, at, which, time[i])
         elif this == TURNS:
             f.tally[which, 0] += 1
             f.stride[which] = 0

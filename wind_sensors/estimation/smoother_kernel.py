@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
-from wind_sensors.estimation.filter_kernel import component
 from wind_sensors.estimation.filter_state import EDGE, OUTPUT, READING, FilterState, Ring
 from wind_sensors.estimation.forward import Instruments
 from wind_sensors.estimation.turbulence_process import LEVELS, PAIRS, SMALL_SCALES, WIND_STATES
+from wind_sensors.estimation.wind_state import component
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -1,0 +1,217 @@
+"""Messages correct the filter: readings, edges, counters, and the silence of a rotor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.compiled import compiled
+from wind_sensors.estimation.filter_state import EDGE, READING, FilterState, Ring
+from wind_sensors.estimation.forward import ON_VANE, Instruments, forcing_of
+from wind_sensors.estimation.turbulence_process import PAIRS, WIND_STATES
+from wind_sensors.estimation.wind_state import wind_of
+
+FloatArray = npt.NDArray[np.float64]
+
+_SURPRISE = 3.5
+"""Innovations beyond this many standard deviations make the filter look for the wind again."""
+_CALM = 0.3
+"""[m/s]"""
+_RARE = 7.0
+"""Log of the odds against a lost or an extra edge before any was seen."""
+_FAR_OUT = 5.0
+"""Innovations beyond this many standard deviations are cut back to it."""
+
+
+@compiled
+def correct(
+    f: FilterState, ring: Ring, slot: int, measured: int, innovation: float, variance: float
+) -> float:
+    """Scalar measurement of one state; returns the squared normalised innovation.
+
+    An innovation far outside its scatter is given the noise that makes it believable.
+    """
+    n = f.mean.shape[0]
+    p = f.covariance
+    total = p[measured, measured] + variance
+    squared = innovation * innovation / total
+    if squared > _FAR_OUT * _FAR_OUT:
+        total = innovation * innovation / (_FAR_OUT * _FAR_OUT)
+    gain = ring.gain[slot]
+    for i in range(n):
+        gain[i] = p[i, measured] / total
+    for i in range(n):
+        f.mean[i] += gain[i] * innovation
+    for i in range(n):
+        for j in range(i + 1):
+            value = p[i, j] - gain[i] * total * gain[j]
+            p[i, j] = value
+            p[j, i] = value
+    ring.measured[slot] = measured
+    ring.innovation[slot] = innovation
+    ring.variance[slot] = total
+    return float(squared)
+
+
+@compiled
+def correct_by_reading(f: FilterState, s: Instruments, ring: Ring, slot: int, v: int, angle: float,
+                       extra_variance: float) -> None:  # fmt: skip
+    """A vane's reading, already turned into a heading of the nose [rad]."""
+    rotors = s.rotor.shape[0]
+    measured = WIND_STATES + 2 * (rotors + v)
+    innovation = angle - f.mean[measured]
+    innovation -= 2.0 * math.pi * math.floor((innovation + math.pi) / (2.0 * math.pi))
+    squared = correct(f, ring, slot, measured, innovation, f.reading_variance[v] + extra_variance)
+    ring.kind[slot] = READING if extra_variance == 0.0 else -READING
+    ring.which[slot] = v
+    _note(f, rotors + v, squared)
+
+
+@compiled
+def _note(f: FilterState, which: int, squared: float) -> None:
+    """Running consistency of the innovations."""
+    keep = 0.998
+    f.innovation[which, 0] = keep * f.innovation[which, 0] + min(squared, 100.0)
+    f.innovation[which, 1] = keep * f.innovation[which, 1] + 1.0
+    if squared > _FAR_OUT * _FAR_OUT:
+        f.outliers[which] += 1
+
+
+@compiled
+def correct_by_edge(
+    f: FilterState, s: Instruments, ring: Ring, slot: int, r: int, time: int
+) -> None:
+    """An edge of rotor r at a time [ns], the number of lost edges resolved.
+
+    Edges were lost (or came extra) when the filter says so and the interval has grown (or shrunk)
+    as much: no rotor changes so quickly by itself.
+    """
+    measured = WIND_STATES + 2 * r + 1
+    width = 2.0 * math.pi / f.slots[r]
+    number = f.edge_count[r]
+    place = int(number % f.slots[r])
+    expected = (number + f.slot_error[r, place]) * width
+    off = (expected - f.mean[measured]) / width
+    spread = math.sqrt(f.covariance[measured, measured]) / width
+    lost = -math.floor(off + 0.5)
+    interval = (time - f.last_used[r]) * 1e-9 / f.stride[r]
+    even = (1.0 + 0.5 * lost / f.stride[r]) * f.slot_interval[r]
+    if (lost > 0 and interval < even) or (lost < 0 and interval > even):
+        lost = 0
+    if f.slot_interval[r] == 0.0:
+        lost = 0
+    if lost != 0:
+        # An edge too many or too few is rare: the evidence must outweigh that.
+        share = (f.tally[r, 1] + f.tally[r, 2] + 0.5) / (f.tally[r, 0] + 1.0)
+        doubt = min(max(-math.log(share), 1.0), _RARE)
+        gained = 0.5 * (off * off - (off + lost) * (off + lost))
+        if gained < doubt * (spread * spread + f.edge_variance[r]):
+            lost = 0
+    if lost != 0:
+        number += lost
+        f.edge_count[r] = number
+        if lost > 0:
+            f.tally[r, 1] += lost
+        else:
+            f.tally[r, 2] -= lost
+        place = int(number % f.slots[r])
+        expected = (number + f.slot_error[r, place]) * width
+    if f.last_used[r] > 0:
+        f.slot_interval[r] = interval * f.stride[r] / max(f.stride[r] + lost, 1)
+    f.last_used[r] = time
+    innovation = expected - f.mean[measured]
+    regain_wind(f, s, r, innovation)
+    variance = f.edge_variance[r] * width * width
+    squared = correct(f, ring, slot, measured, innovation, variance)
+    ring.kind[slot] = EDGE
+    ring.which[slot] = r
+    ring.slot[slot] = place
+    _note(f, r, squared)
+
+
+@compiled
+def regain_wind(f: FilterState, s: Instruments, r: int, innovation: float) -> None:
+    """Look for the wind again when rotor r runs ahead although the believed wind would brake it.
+
+    The torque as a function of the wind has two branches around half the rotor's speed; in a lull
+    the filter may sit on the lower one when the wind comes back, and no small step leads across.
+    The wind is then put to what drives the rotor, along the vane, with a wide covariance.
+    """
+    rotors = s.rotor.shape[0]
+    state = WIND_STATES + 2 * r
+    variance = f.covariance[state + 1, state + 1]
+    if innovation < _SURPRISE * math.sqrt(variance) or s.vane.shape[0] == 0:
+        return
+    v = int(s.mounting[r, 1]) if int(s.mounting[r, 0]) == ON_VANE else 0
+    phi = f.mean[WIND_STATES + 2 * (rotors + v)]
+    c = f.circumstances
+    wind = np.empty(3)
+    wind_of(f.mean, wind)
+    forcing, _ = forcing_of(s, r, wind, c, phi, 0.0)
+    y = f.mean[state]
+    if forcing > y:
+        return
+    speed = 1.2 * y + s.rotor[r, 2] + 0.1
+    x = -speed * math.cos(phi)
+    z = -speed * math.sin(phi)
+    spread = (0.3 * speed + _CALM) ** 2
+    for k in range(2 * PAIRS):
+        f.mean[k] = 0.0
+    f.mean[2 * PAIRS - 2] = c[3] * x + c[4] * z + c[0]
+    f.mean[2 * PAIRS - 1] = c[6] * x + c[7] * z + c[1]
+    f.covariance[2 * PAIRS - 2, 2 * PAIRS - 2] += spread
+    f.covariance[2 * PAIRS - 1, 2 * PAIRS - 1] += spread
+    f.covariance[state, state] += spread
+    f.covariance[state + 1, state + 1] += innovation * innovation
+    f.tally[r, 3] += 1
+
+
+@compiled
+def correct_by_turns(f: FilterState, ring: Ring, slot: int, r: int, angle: float) -> None:
+    """The angle that rotor r has turned through [rad], from a counter or an encoder.
+
+    A reading far from what the rotor can have done means that the counter began anew.
+    """
+    measured = WIND_STATES + 2 * r + 1
+    width = 2.0 * math.pi / f.slots[r]
+    innovation = angle - f.mean[measured]
+    spread = math.sqrt(f.covariance[measured, measured])
+    if abs(innovation) > 4.0 * spread + 20.0 * width:
+        f.rejected[r] += 1
+        if f.rejected[r] >= 3:
+            f.mean[measured] = angle
+            f.rejected[r] = 0
+            f.tally[r, 3] += 1
+        return
+    f.rejected[r] = 0
+    squared = correct(f, ring, slot, measured, innovation, f.edge_variance[r] * width * width)
+    ring.kind[slot] = EDGE
+    ring.which[slot] = r
+    _note(f, r, squared)
+
+
+@compiled
+def correct_by_silence(f: FilterState, ring: Ring, slot: int, r: int, limit: float) -> None:
+    """No edge yet: rotor r has not passed `limit` [rad]; a truncated normal distribution.
+
+    Its mean and variance are matched by an equivalent measurement, so that the smoother sees an
+    ordinary one.
+    """
+    measured = WIND_STATES + 2 * r + 1
+    variance = f.covariance[measured, measured]
+    deviation = math.sqrt(variance)
+    z = (limit - f.mean[measured]) / deviation
+    if z > 2.5:
+        return
+    if z > -5.0:
+        ratio = math.exp(-0.5 * z * z) / (
+            math.sqrt(2.0 * math.pi) * 0.5 * math.erfc(-z / math.sqrt(2.0))
+        )
+    else:
+        ratio = -z - 1.0 / z
+    left = min(max(1.0 - z * ratio - ratio * ratio, 1e-4), 0.999)
+    noise = variance * left / (1.0 - left)
+    innovation = -deviation * ratio * (variance + noise) / variance
+    correct(f, ring, slot, measured, innovation, noise)
