@@ -57,6 +57,7 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     "potentiometer_gap": MinimumSize(4.0, "deg", "width of the vane's dead gap"),
     "quantisation": MinimumSize(2.0, "deg", "step of the vane's reading"),
     "low_pass_filter": MinimumSize(0.12, "s", "time constant of the vane's electronics"),
+    "sensor_swap": MinimumSize(1.0, "1", "whether the vane counts clockwise", graded=False),
     "stuck_sensor": MinimumSize(20.0, "s", "time for which a signal stands still"),
     "timestamp_latency": MinimumSize(0.1, "s", "delay of the stamps"),
     "clock_drift": MinimumSize(0.25, "s", "error of the stamps at the end of the record"),

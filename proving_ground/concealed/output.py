@@ -165,6 +165,13 @@ def _first_order(signal: object, pace: float) -> Array:
     return np.asarray(lfilter([pace], [1.0, pace - 1.0], values, zi=start)[0])
 
 
+def sensor_swap(scene: Scene, amount: float, activity: Array) -> Parameters:
+    """The two tracks of the vane's encoder are exchanged at the plug: it counts clockwise."""
+    active = active_at(scene, activity)
+    scene.reading_changes.append(lambda time, angle: np.where(active(time) > 0.5, -angle, angle))
+    return {"counts": "clockwise"}
+
+
 def stuck_sensor(scene: Scene, amount: float, activity: Array) -> Parameters:
     """A vane frozen in place or a rotor held still for a while."""
     length = min(amount, 0.4 * scene.duration)
@@ -227,6 +234,7 @@ CAUSES: dict[str, Cause] = {
     "potentiometer_gap": Cause("vane", potentiometer_gap),
     "quantisation": Cause("vane", quantisation),
     "low_pass_filter": Cause("vane", low_pass_filter),
+    "sensor_swap": Cause("vane", sensor_swap),
     "stuck_sensor": Cause("rotor", stuck_sensor),
     "timestamp_latency": Cause("rotor", timestamp_latency),
     "clock_drift": Cause("rotor", clock_drift),

@@ -46,8 +46,8 @@ COMPARABLE: dict[str, tuple[Comparable, ...]] = {
     "calibration_drift": (Comparable("gain", _of("indicated_over_true")),),
     "calibration_offset": (Comparable("offset", _of("offset"), unsigned=True),),
     "air_density": (Comparable("density_ratio", _of("density_factor")),),
-    "rotor_inertia": (Comparable("inertia_ratio", _of("factor")),),
-    "vane_inertia": (Comparable("inertia_ratio", _of("factor")),),
+    "rotor_inertia": (Comparable("inertia_factor", _of("factor")),),
+    "vane_inertia": (Comparable("inertia_factor", _of("factor")),),
     "vane_offset": (Comparable("offset", _of("offset_deg"), unsigned=True),),
     "quantisation": (Comparable("step", _of("step_deg")),),
     "potentiometer_gap": (Comparable("width", _of("width_deg")),),
@@ -56,9 +56,7 @@ COMPARABLE: dict[str, tuple[Comparable, ...]] = {
     "timestamp_latency": (Comparable("latency", _of("latency_s")),),
     "clock_drift": (Comparable("drift", _of("drift_ppm"), unsigned=True),),
     "low_pass_filter": (Comparable("time_constant", _of("time_constant_s")),),
-    "platform_velocity_scale": (
-        Comparable("velocity_scale", lambda a: 1.0 / float(a["reported_over_true"])),
-    ),
+    "platform_velocity_scale": (Comparable("velocity_scale", _of("reported_over_true")),),
     "lever_arm": (
         Comparable("dx", lambda a: float(a["true_m"][0]) - float(a["sheet_m"][0])),
         Comparable("dy", lambda a: float(a["true_m"][1]) - float(a["sheet_m"][1])),
