@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.observation import HARMONICS, NORMALISED_BANDS, STILLNESS, Channel
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STILLNESS, Channel
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,8 +20,7 @@ FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 
 _BANDS = len(NORMALISED_BANDS) - 1
 _SPECTRUM_PRIOR = 0.22
-_SHARE_PRIOR = 0.003
-_AMPLITUDE_PRIOR = 0.012
+_INTERVAL_PRIOR = np.array([0.002, 0.002, 0.003, 0.001, 0.0007, 0.001])
 _STILLNESS_PRIOR = 0.12
 
 
@@ -30,9 +29,7 @@ def statistics_prior(channel: Channel) -> FloatArray:
     bands = np.full(_BANDS, _SPECTRUM_PRIOR)
     if channel.kind == "vane_angle":
         return np.concatenate((bands, np.full(STILLNESS, _STILLNESS_PRIOR)))
-    return np.concatenate(
-        (bands, np.full(2, _SHARE_PRIOR), np.full(2 * HARMONICS, _AMPLITUDE_PRIOR))
-    )
+    return np.concatenate((bands, _INTERVAL_PRIOR))
 
 
 @dataclass(frozen=True)
@@ -72,7 +69,8 @@ class Baseline:
         means: Amplitude of each template shared by the healthy recordings, by
             `effect|instrument|template number`, in units of the template.
         standing: Scatter of each template's amplitude between them.
-        checks: Largest values of the omnibus checks on the healthy recordings, by name.
+        remainder_scale: Largest remainders on the healthy recordings relative to those of drawn
+            white noise.
     """
 
     recordings: tuple[str, ...]
@@ -80,7 +78,7 @@ class Baseline:
     channels: Mapping[str, ChannelBaseline]
     means: Mapping[str, float] = field(default_factory=dict)
     standing: Mapping[str, float] = field(default_factory=dict)
-    checks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    remainder_scale: float = 1.0
 
     @property
     def calibrated(self) -> bool:
@@ -98,7 +96,7 @@ class Baseline:
             },
             "means": dict(self.means),
             "standing": dict(self.standing),
-            "checks": {k: list(v) for k, v in self.checks.items()},
+            "remainder_scale": self.remainder_scale,
         }
         return json.dumps(content, indent=1)
 
@@ -120,7 +118,7 @@ class Baseline:
                 },
                 means=content["means"],
                 standing=content["standing"],
-                checks={k: tuple(v) for k, v in content["checks"].items()},
+                remainder_scale=float(content["remainder_scale"]),
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem

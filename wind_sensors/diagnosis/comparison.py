@@ -17,7 +17,6 @@ import numpy.typing as npt
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.observation import (
-    HARMONICS,
     LOWEST_BAND_FREQUENCY,
     NORMALISED_BANDS,
     SERIES_INTERVAL,
@@ -49,8 +48,10 @@ LOW_END = 0.02
 SHORTEST = 60.0
 """A recording needs this much time in common with its reference [s]."""
 
+FASTEST = 60.0
+"""A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
+
 BANDS = len(NORMALISED_BANDS) - 1
-INTERVALS = 2 + 2 * HARMONICS
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,7 @@ class Comparison:
         speed: Slow apparent wind speed at the bins [m/s].
         wind_from: Direction the apparent wind comes from at the bins, continuous [rad].
         measured: Of the recording.
+        mask: Weight of each bin, 1 inside the blocks that count, 0 outside; None: all count.
     """
 
     recording: Recording
@@ -120,6 +122,13 @@ class Comparison:
     speed: FloatArray
     wind_from: FloatArray
     measured: Simulated
+    mask: FloatArray | None = None
+
+    def within(self, mask: FloatArray) -> Comparison:
+        """The same comparison in the blocks of a mask only, shape (n,)."""
+        masked = replace(self, mask=mask)
+        measured = masked.observe(self.recording.pulses, self.recording.angles)
+        return replace(masked, measured=measured)
 
     @property
     def coefficients(self) -> int:
@@ -153,6 +162,9 @@ class Comparison:
             if only and name not in only:
                 continue
             if c.kind == "rotor_rate":
+                turned = response.rotors[name].psi[-1]
+                if not np.isfinite(turned) or abs(turned) > FASTEST * self.drive.wind.shape[0]:
+                    raise ValueError(f"'{name}' runs away")
                 pulses[name] = Pulses(edge_times(response, name))
             else:
                 time = self.recording.angles[name].time
@@ -192,25 +204,31 @@ class Comparison:
                 assert isinstance(rotor, Rotor)
                 values = rate_series(pulses[channel.instrument], rotor, self.grid)
                 intervals = interval_statistics(
-                    pulses[channel.instrument], rotor, self.wind_from, self.grid
+                    pulses[channel.instrument], rotor, self.wind_from, self.grid, self.mask
                 )
-                full = spectra.to_cosine(values)
+                full = spectra.to_cosine(self._masked(values - np.mean(values)))
+                full[0] = np.sqrt(values.size) * np.mean(self._masked(values))
                 bands = self._log_spectrum(full, self.grid.dt, channel, 2.2)
                 statistics[channel.name] = np.concatenate((bands, intervals))
             else:
                 readings = angles[channel.instrument]
                 deviation = angle_series(readings, self.direction, self.grid)
                 values = deviation * self.speed
-                full = spectra.to_cosine(values)
+                full = spectra.to_cosine(self._masked(values))
                 statistics[channel.name] = np.concatenate(
                     (
                         self._vane_spectrum(readings, channel),
-                        stillness_statistics(deviation + self.direction, self.speed),
+                        stillness_statistics(
+                            deviation + self.direction, self.speed, self.mask
+                        ),
                     )
                 )
             series[channel.name] = values
             cosine[channel.name] = full[: self.coefficients]
         return Simulated(cosine, series, statistics)
+
+    def _masked(self, values: FloatArray) -> FloatArray:
+        return values if self.mask is None else values * self.mask
 
     def _vane_spectrum(self, readings: Angles, channel: Channel) -> FloatArray:
         time = self.grid.seconds(readings.time)
@@ -219,7 +237,7 @@ class Comparison:
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
         deviation = np.nan_to_num(np.angle(np.exp(1j * (readings.angle - around))))
-        weighted = deviation * np.interp(time, self.grid.centres, self.speed)
+        weighted = deviation * np.interp(time, self.grid.centres, self._masked(self.speed))
         return self._log_spectrum(
             spectra.to_cosine(np.asarray(weighted)), dt, channel, 0.4 / dt
         )

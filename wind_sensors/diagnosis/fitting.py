@@ -74,6 +74,7 @@ class Fit:
         simulated: Simulation at the fit.
         covariance: Of all parameters, in the order of the terms and their parameters.
         evaluations: Number of simulations it took.
+        active: Number of parameters that the recording can see.
     """
 
     terms: tuple[Term, ...]
@@ -82,6 +83,7 @@ class Fit:
     simulated: Simulated
     covariance: FloatArray
     evaluations: int
+    active: int = 0
 
 
 def _parameters(terms: Sequence[Term]) -> list[tuple[int, Parameter]]:
@@ -228,4 +230,5 @@ def fit(
     information = normal / np.outer(scale, scale)
     covariance = np.linalg.pinv(information + np.diag(1e-9 / (high - low) ** 2))
     fitted = _with_values(terms, values)
-    return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations)
+    active = int(np.count_nonzero(np.diag(normal) > 1e-4))
+    return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations, active)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.comparison import BANDS, Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.station.model import Angle, Rotor, Station
@@ -79,13 +79,9 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
                 bounce_probability=min(2.0 * short, 0.9), bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
             )
         )  # fmt: skip
-    name = f"{rotor.name}/rotor_rate"
-    locked = comparison.measured.statistics[name][-4]
-    if rotor.pulses_per_revolution > 2 and locked > 0.02:
-        out.extend(
-            _term("encoder_slot_error", rotor.name, sine=size * locked, cosine=0.0)
-            for size in (0.5, 1.0)
-        )
+    scatter = comparison.measured.statistics[f"{rotor.name}/rotor_rate"][BANDS + 2]
+    if rotor.pulses_per_revolution > 2 and scatter > 0.01:
+        out.append(_term("encoder_slot_error", rotor.name, scatter=0.7 * float(scatter)))
     return out
 
 

@@ -37,11 +37,10 @@ WINDOW_ADVANTAGE = 12.0
 FINALISTS = 5
 
 
-def parameter_cost(terms: Sequence[Term]) -> float:
-    """What the parameters and intervals of terms cost."""
-    cost = 0.0
+def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
+    """What parameters and intervals cost."""
+    cost = PENALTY_PER_PARAMETER * parameters
     for term in terms:
-        cost += PENALTY_PER_PARAMETER * len(term.effect.parameters)
         if term.interval != ALWAYS:
             cost += PENALTY_PER_INTERVAL * sum(
                 (term.interval[0] > 0.0, term.interval[1] is not None)
@@ -89,11 +88,26 @@ def _no_terms(whitener: Whitener, searcher: Searcher) -> Fit:
 
 
 def _total(candidate: Fit) -> float:
-    return candidate.cost + parameter_cost(candidate.terms)
+    return candidate.cost + parameter_cost(candidate.terms, candidate.active)
 
 
-def _large_enough(candidate: Fit) -> bool:
-    return candidate.terms[-1].relative_size >= SMALLEST_SIZE
+def _plausible(candidate: Fit) -> bool:
+    """Whether the newest term is large enough to matter and its parameters are determined.
+
+    A search that ran into the bounds of a parameter has found the wrong effect.
+    """
+    term = candidate.terms[-1]
+    if term.relative_size < SMALLEST_SIZE:
+        return False
+    for parameter in term.effect.parameters:
+        if parameter.healthy is None or parameter.minimum <= 0.0:
+            continue
+        margin = 0.005 * (parameter.high - parameter.low)
+        value = term.values[parameter.name]
+        at_bound = value < parameter.low + margin or value > parameter.high - margin
+        if at_bound and abs(value - parameter.healthy) > margin:
+            return False
+    return True
 
 
 def _window_starts(
@@ -199,7 +213,7 @@ def name(
         ]
         windowed = _window_starts(searcher, whitener, current.vector, used)
         fits = searcher.fit_all(whitener, fixed, [*candidates, *windowed])
-        fits = sorted((f for f in fits if _large_enough(f)), key=_total)
+        fits = sorted((f for f in fits if _plausible(f)), key=_total)
         needed = ACCEPTED_GAIN if first else ACCEPTED_FURTHER_GAIN
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
@@ -226,7 +240,7 @@ def name(
         before = fit(whitener, searcher.station, fixed, searcher.bank.without) if fixed else (
             _no_terms(whitener, searcher)
         )
-        if _total(before) - _total(refitted[0]) < needed or not _large_enough(refitted[0]):
+        if _total(before) - _total(refitted[0]) < needed or not _plausible(refitted[0]):
             current = before
             break
         current = refitted[0]

@@ -6,13 +6,14 @@ signals (binning, interpolation between pulses) they do to both.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.compiled import compiled
 from wind_sensors.station.model import Angle, Cup, Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
 
@@ -28,8 +29,8 @@ NORMALISED_BANDS = np.array([0.12, 0.25, 0.45, 0.8, 1.3, 2.0, 3.2, 5.0])
 LOWEST_BAND_FREQUENCY = 0.12
 """Spectral ratios begin here [Hz]; below, errors of the reference dominate."""
 
-HARMONICS = 2
-"""Harmonics of the pulse intervals within a revolution."""
+INTERVALS = 6
+"""Number of statistics of the pulse intervals."""
 
 
 @dataclass(frozen=True)
@@ -148,19 +149,30 @@ STILLNESS = 3
 """Number of statistics of how still a vane stands between its movements."""
 
 
-def stillness_statistics(series: FloatArray, speed: FloatArray) -> FloatArray:
+def stillness_statistics(
+    series: FloatArray, speed: FloatArray, mask: FloatArray | None = None
+) -> FloatArray:
     """How still a vane stands between its movements: small turns against large ones.
 
     Args:
         series: Angle in each bin [rad], shape (n,).
         speed: Slow wind speed at the bins [m/s], shape (n,).
+        mask: Weight of the bins; those below a half do not count.
 
     Returns:
         Logarithms of the ratios of quantiles (25 to 75 %, 10 to 50 %) of the turns from bin to bin
         in the slowest third of the record, and the first for the rest.
     """
     turns = np.abs(np.diff(series)) + 1e-6
-    slow = speed[1:] < np.quantile(speed, 0.33)
+    if mask is not None:
+        turns, speed = turns[mask[1:] > 0.5], speed[mask > 0.5]
+        speed = speed[: turns.size]
+        turns = turns[: speed.size]
+    else:
+        speed = speed[1:]
+    if turns.size < 150:
+        return np.zeros(STILLNESS)
+    slow = speed < np.quantile(speed, 0.33)
     out = np.zeros(STILLNESS)
     if np.count_nonzero(slow) < 50:
         return out
@@ -172,7 +184,11 @@ def stillness_statistics(series: FloatArray, speed: FloatArray) -> FloatArray:
 
 
 def interval_statistics(
-    pulses: Pulses, rotor: Cup | Propeller, direction: FloatArray, grid: Grid
+    pulses: Pulses,
+    rotor: Cup | Propeller,
+    direction: FloatArray,
+    grid: Grid,
+    mask: FloatArray | None = None,
 ) -> FloatArray:
     """How the pulse intervals are distributed within a revolution, whatever the wind.
 
@@ -181,39 +197,85 @@ def interval_statistics(
         rotor: The rotor.
         direction: Direction of the wind in the plane of rotation at the bins' centres [rad].
         grid: Bins of `direction`.
+        mask: Weight of the bins; intervals where it is below a half do not count.
 
     Returns:
-        Share of intervals over 1.6 and under 0.4 times their neighbourhood's mean, then for each
-        harmonic of the revolution the amplitude of the relative interval locked to the slot and
-        locked to the wind's direction (0 where the pulses are too few to tell).
+        Share of intervals over 1.6 and under 0.4 times their neighbourhood's mean; relative
+        scatter of the slots' mean intervals; amplitude of the relative interval once per
+        revolution locked to the slot, once and twice per revolution locked to the wind's
+        direction (0 where the pulses are too few to tell).
     """
-    out = np.zeros(2 + 2 * HARMONICS)
-    time = grid.seconds(pulses.time)
-    slots = rotor.pulses_per_revolution
-    if time.size < 200:
+    weight = np.ones(grid.n) if mask is None else mask
+    return _interval_statistics(
+        grid.seconds(pulses.time), rotor.pulses_per_revolution, direction, weight, grid.dt
+    )
+
+
+@compiled
+def _interval_statistics(
+    time: FloatArray, slots: int, direction: FloatArray, weight: FloatArray, dt: float
+) -> FloatArray:
+    out = np.zeros(INTERVALS)
+    edges = time.size
+    if edges < 200:
         return out
-    interval = np.diff(time)
     window = max(5, 2 * (slots // 2) + 1) if slots > 1 else 5
-    kernel = np.full(window, 1.0 / window)
-    local = np.convolve(interval, kernel, mode="same")
-    relative = interval / np.maximum(local, 1e-9)
-    core = relative[window:-window]
-    out[0] = np.mean(core > 1.6)
-    out[1] = np.mean(core < 0.4)
+    half = window // 2
+    long = 0
+    short = 0
+    counted = 0
+    for i in range(window, edges - 1 - window):
+        place = min(max(int(time[i] / dt), 0), weight.size - 1)
+        if weight[place] <= 0.5:
+            continue
+        local = (time[i + half + 1] - time[i - half]) / window
+        relative = (time[i + 1] - time[i]) / max(local, 1e-9)
+        counted += 1
+        if relative > 1.6:
+            long += 1
+        elif relative < 0.4:
+            short += 1
+    if counted < 100:
+        return out
+    out[0] = long / counted
+    out[1] = short / counted
     if slots < 3:
         return out
-    total = np.concatenate(([0.0], np.cumsum(interval)))
-    revolution = (total[slots:] - total[:-slots]) / slots
+    total = np.zeros(slots)
+    number = np.zeros(slots)
+    squares = 0.0
+    turning = 2.0 * math.pi / slots
+    once_slot = 0.0 + 0.0j
+    once_wind = 0.0 + 0.0j
+    twice_wind = 0.0 + 0.0j
     first = slots // 2
-    deviation = np.clip(interval[first : first + revolution.size] / revolution - 1.0, -0.8, 0.8)
-    slot = np.arange(first, first + revolution.size)
-    middle = 0.5 * (time[1:] + time[:-1])[first : first + revolution.size]
-    heading = np.interp(middle, grid.centres, direction)
-    for k in range(HARMONICS):
-        harmonic = k + 1
-        if 2 * harmonic > slots - 1:
+    kept = 0
+    for j in range(edges - slots):
+        i = j + first
+        place = min(max(int(time[i] / dt), 0), weight.size - 1)
+        if weight[place] <= 0.5:
             continue
-        turned = harmonic * (2.0 * np.pi / slots) * slot
-        out[2 + 2 * k] = 2.0 * abs(np.mean(deviation * np.exp(-1j * turned)))
-        out[3 + 2 * k] = 2.0 * abs(np.mean(deviation * np.exp(-1j * (turned - harmonic * heading))))
+        revolution = (time[j + slots] - time[j]) / slots
+        deviation = (time[i + 1] - time[i]) / max(revolution, 1e-9) - 1.0
+        deviation = min(max(deviation, -0.8), 0.8)
+        slot = i % slots
+        total[slot] += deviation
+        number[slot] += 1.0
+        squares += deviation * deviation
+        kept += 1
+        turned = turning * slot
+        away = turned - direction[place]
+        once_slot += deviation * complex(math.cos(turned), -math.sin(turned))
+        once_wind += deviation * complex(math.cos(away), -math.sin(away))
+        twice = 2.0 * away
+        twice_wind += deviation * complex(math.cos(twice), -math.sin(twice))
+    if kept < 100:
+        return out
+    means = total / np.maximum(number, 1.0)
+    variance = squares / kept - (np.sum(total) / kept) ** 2
+    out[2] = math.sqrt(max(np.var(means) - variance * slots / kept, 0.0))
+    out[3] = 2.0 * abs(once_slot) / kept
+    out[4] = 2.0 * abs(once_wind) / kept
+    if slots > 4:
+        out[5] = 2.0 * abs(twice_wind) / kept
     return out

@@ -6,6 +6,7 @@ so that its p value already pays for looking everywhere.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -168,7 +169,7 @@ def _frequency_regions(
     edges = spectra.band_edges(n)
     per = 1.0 / (2.0 * comparison.grid.n * comparison.grid.dt)
     groups = edges[2::2]
-    for a, b in zip(groups[:-1], groups[1:], strict=True):
+    for a, b in itertools.pairwise(groups):
         low, high = float(a * per), float(b * per)
         label = f"{low:.3g} to {high:.3g} Hz"
         yield (

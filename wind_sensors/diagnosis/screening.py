@@ -150,7 +150,7 @@ def windows(comparison: Comparison) -> list[tuple[float, float]]:
     length = comparison.grid.n * comparison.grid.dt
     cuts = np.arange(WINDOW_STEP, length - 0.5 * WINDOW_STEP, WINDOW_STEP)
     out = [(float(c), length) for c in cuts] + [(0.0, float(c)) for c in cuts]
-    coarse = cuts[1::3]
+    coarse = cuts[1::4]
     out += [
         (float(a), float(b)) for k, a in enumerate(coarse) for b in coarse[k + 1 :]
     ]
@@ -176,19 +176,23 @@ def screen_windows(
     """
     comparison = whitener.comparison
     at = comparison.grid.centres
+    spans = windows(comparison)
     best: tuple[float, tuple[float, float] | None, float, int] = (0.0, None, 0.0, members[0])
     for k in members:
-        for begin, end in windows(comparison):
-            inside = (at >= begin) & (at < end)
-            signature = whitener.through_standing(
+        rows = np.array(
+            [
                 windowed_signature(
-                    comparison, bank.without, bank.with_each[k], whitener.trust, inside
+                    comparison, bank.without, bank.with_each[k], whitener.trust,
+                    (at >= begin) & (at < end),
                 )
-            )
-            power = float(signature @ signature)
-            if power < _WEAKEST:
-                continue
-            seen = float(signature @ vector)
-            if seen * seen / power > best[0]:
-                best = (seen * seen / power, (begin, end), seen / power, k)
+                for begin, end in spans
+            ]
+        )  # fmt: skip
+        white = whitener.through_standing(rows)
+        power = np.einsum("ij,ij->i", white, white)
+        seen = white @ vector
+        gains = np.where(power > _WEAKEST, seen**2 / np.maximum(power, _WEAKEST), 0.0)
+        top = int(np.argmax(gains))
+        if gains[top] > best[0]:
+            best = (float(gains[top]), spans[top], float(seen[top] / power[top]), k)
     return best

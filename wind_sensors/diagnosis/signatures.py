@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,12 +110,13 @@ def templates_of(
     return out
 
 
-_task: tuple[Callable[[Any], Any], Sequence[Any]] | None = None
+_TASK: list[tuple[Callable[[Any], Any], Sequence[Any]]] = []
+"""What forked processes work on: the innermost call's function and items."""
 
 
 def _run(index: int) -> Any:
-    assert _task is not None
-    return _task[0](_task[1][index])
+    function, items = _TASK[-1]
+    return function(items[index])
 
 
 def in_parallel(
@@ -132,21 +133,23 @@ def in_parallel(
         workers: Number of processes; 1 stays in this one.
         progress: Called with the share done.
     """
-    global _task
     out: list[Any] = []
     if workers < 2 or len(items) < 4 or "fork" not in multiprocessing.get_all_start_methods():
-        for item in items:
-            out.append(function(item))
-            if progress:
-                progress(len(out) / len(items))
-        return out
-    _task = (function, items)
-    with multiprocessing.get_context("fork").Pool(workers) as pool:
-        for result in pool.imap(_run, range(len(items)), chunksize=2):
+        results: Iterable[Any] = map(function, items)
+        for result in results:
             out.append(result)
             if progress:
                 progress(len(out) / len(items))
-    _task = None
+        return out
+    _TASK.append((function, items))
+    try:
+        with multiprocessing.get_context("fork").Pool(workers) as pool:
+            for result in pool.imap(_run, range(len(items)), chunksize=2):
+                out.append(result)
+                if progress:
+                    progress(len(out) / len(items))
+    finally:
+        _TASK.pop()
     return out
 
 

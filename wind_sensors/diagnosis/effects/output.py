@@ -94,14 +94,17 @@ EXTRA_PULSES = Effect(
 )
 
 
+_GOLDEN = 0.6180339887
+
+
 def _slots(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
     n = entry.pulses_per_revolution
-    errors = tuple(
-        values["sine"] * math.sin(2.0 * math.pi * k / n)
-        + values["cosine"] * math.cos(2.0 * math.pi * k / n)
-        for k in range(n)
-    )
+    # The errors of single slots do not matter here: a pattern without a preferred harmonic.
+    pattern = [math.cos(2.0 * math.pi * (_GOLDEN * k * k + 0.1)) for k in range(n)]
+    middle = sum(pattern) / n
+    size = math.sqrt(sum((p - middle) ** 2 for p in pattern) / n) or 1.0
+    errors = tuple(values["scatter"] * (p - middle) / size for p in pattern)
     return _electronics(entry, slot_errors=errors)
 
 
@@ -109,16 +112,13 @@ ENCODER_SLOT_ERROR = Effect(
     name="encoder_slot_error",
     meaning="The slots of the pulse disc are not evenly spaced.",
     entrance="output",
-    equation="edge of slot k at (k + error_k) 2 pi / n",
+    equation="edge of slot k at (k + error_k) 2 pi / n; scatter = rms of the errors",
     source="geometry of the disc",
     region="pulse intervals against rotor angle, all speeds alike",
-    parameters=(
-        Parameter("sine", "1", -0.9, 0.9, minimum=0.04, step=0.01),
-        Parameter("cosine", "1", -0.9, 0.9, minimum=0.04, step=0.01),
-    ),
-    applies=lambda entry, station: isinstance(entry, Rotor) and entry.pulses_per_revolution > 1,
+    parameters=(Parameter("scatter", "1", 0.0, 0.3, minimum=0.012, step=0.004, starts=(0.03,)),),
+    applies=lambda entry, station: isinstance(entry, Rotor) and entry.pulses_per_revolution > 2,
     update=_slots,
-    templates=({"sine": 0.04, "cosine": 0.0},),
+    templates=({"scatter": 0.02},),
     confusable={
         "damaged_cup": "turn the rotor by hand: slot errors stay, the torque does not",
         "missed_pulses": "pulse intervals against rotor angle",

@@ -74,11 +74,7 @@ CALIBRATION_OFFSET = Effect(
 
 def _friction(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
-    speed = (entry.friction_speed**2 + values["friction_speed"] ** 2) ** 0.5
-    return {
-        "friction_speed": speed,
-        "friction_temperature_coefficient": values["temperature_coefficient"],
-    }
+    return {"friction_speed": (entry.friction_speed**2 + values["friction_speed"] ** 2) ** 0.5}
 
 
 BEARING_FRICTION = Effect(
@@ -93,11 +89,10 @@ BEARING_FRICTION = Effect(
         Parameter(
             "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 2.0)
         ),
-        Parameter("temperature_coefficient", "1/K", -0.2, 0.05, minimum=0.0, step=0.01),
     ),
     applies=_is_rotor,
     update=_friction,
-    templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0},),
+    templates=({"friction_speed": 0.5},),
     confusable={
         "calibration_offset": "a speed sweep: friction fades as 1/U, an offset stays",
         "calibration_drift": "a speed sweep",
@@ -168,7 +163,7 @@ TORQUE_ASYMMETRY = Effect(
     source="K94, eqs. (1), (2); K14, eq. (76)",
     region="mean speed and skewness in strong turbulence",
     parameters=(
-        Parameter("a4", "1", -0.9, 2.9, healthy=1.0, minimum=0.4, step=0.1),
+        Parameter("a4", "1", 0.05, 2.5, healthy=1.0, minimum=0.4, step=0.1),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor),
     update=_set("a4"),
@@ -193,13 +188,13 @@ DAMAGED_CUP = Effect(
     source="derived: one unequal cup of three",
     region="once per revolution, locked to the wind's direction; a lower calibration",
     parameters=(
-        Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.1, step=0.03, starts=(0.2,)),
+        Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.02, step=0.005, starts=(0.05,)),
         Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.004, starts=(0.97,)),
     ),
     applies=_is_rotor,
     update=_damage,
     templates=(
-        {"torque_harmonic": 0.1, "gain": 1.0},
+        {"torque_harmonic": 0.03, "gain": 1.0},
     ),
     confusable={
         "encoder_slot_error": "turn the rotor by hand: slot errors stay, the torque does not",

@@ -277,7 +277,7 @@ SENSOR_SWAP = Effect(
     equation="reading = -phi",
     source="definition",
     region="all directions",
-    parameters=(Parameter("reversed", "1", 0.0, 1.0, minimum=0.3, step=1.0, starts=(1.0,)),),
+    parameters=(Parameter("reversed", "1", -0.2, 1.2, minimum=0.6, step=1.0, starts=(1.0,)),),
     applies=_is_vane,
     update=_reversed,
     templates=({"reversed": 1.0},),

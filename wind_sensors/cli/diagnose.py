@@ -1,0 +1,91 @@
+"""`wind diagnose`: find the physics that a station file leaves out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress, TaskID
+from rich.table import Table
+
+from wind_sensors.cli.baseline import learnt, read_baseline, workers
+from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.reading import read_recording
+from wind_sensors.report.diagnosis_files import make_way, write
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "diagnose",
+        help="find the physics that a station file leaves out",
+        description="Compare a RECORDING with the simulation of its station, name the physics "
+        "that was left out, and prove it on data that were not fitted. Writes diagnosis.json, "
+        "report.html, station_corrected.yaml and residuals/.",
+    )
+    parser.add_argument("recording", metavar="RECORDING", help="recording folder or bag")
+    parser.add_argument("--station", metavar="FILE", help="station file of a bag")
+    parser.add_argument(
+        "--healthy", metavar="RECORDING", nargs="+", action="extend", default=[],
+        help="recordings of the same station while nothing was wrong",
+    )  # fmt: skip
+    parser.add_argument(
+        "--baseline", metavar="FILE", type=Path, help="what `wind baseline` wrote, instead"
+    )
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder")
+    parser.add_argument("--force", action="store_true", help="replace an earlier diagnosis")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Diagnose and write; 0 whatever the verdict."""
+    make_way(options.output, force=options.force)
+    if options.baseline is not None and options.healthy:
+        raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        recording = read_recording(options.recording, options.station)
+        if options.baseline is not None:
+            baseline = read_baseline(options.baseline)
+        else:
+            baseline = learnt(options.healthy, options.station, recording.station, progress)
+        tasks: dict[str, TaskID] = {}
+
+        def report(phase: str, share: float) -> None:
+            if phase not in tasks:
+                tasks[phase] = progress.add_task(phase, total=1.0)
+            progress.update(tasks[phase], completed=share)
+
+        diagnosis = diagnose(recording, baseline, None, workers(), report)
+        written = write(options.output, diagnosis)
+    _print(Console(), diagnosis)
+    for path in written:
+        print(f"wrote {path}")
+    return 0
+
+
+def _print(console: Console, diagnosis: Diagnosis) -> None:
+    console.print(f"[bold]{diagnosis.recording}[/bold]: {diagnosis.verdict}")
+    if diagnosis.findings:
+        table = Table(box=None)
+        for column in ("effect", "instrument", "size", "95 % interval", "removed on held-out data"):
+            table.add_column(column)
+        for finding in diagnosis.findings:
+            removed = ""
+            if finding.proof is not None:
+                removed = f"{100.0 * finding.proof.excess_removed:.0f} %"
+            for k, (key, e) in enumerate(finding.parameters.items()):
+                unit = "" if e.unit == "1" else f" {e.unit}"
+                table.add_row(
+                    finding.term.effect.name if k == 0 else "",
+                    finding.term.instrument if k == 0 else "",
+                    f"{key} {e.value:.3g}{unit}",
+                    f"{e.low:.3g} to {e.high:.3g}",
+                    removed if k == 0 else "",
+                )
+        console.print(table)
+    if diagnosis.unexplained.description:
+        console.print(f"left over: {diagnosis.unexplained.description}")
+    if not diagnosis.calibrated:
+        console.print("null not calibrated: give --healthy recordings of the same station")

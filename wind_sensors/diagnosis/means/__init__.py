@@ -1,0 +1,1 @@
+"""Recordings of means: the instruments of a mast against each other."""

@@ -1,0 +1,468 @@
+"""The diagnosis of one recording: verdict, findings, what is left, what could have been seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.guesses import guesses_of
+from wind_sensors.diagnosis.naming import (
+    ACCEPTED_GAIN,
+    Alternative,
+    Naming,
+    name,
+)
+from wind_sensors.diagnosis.proof import Proof, prove
+from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
+from wind_sensors.diagnosis.screening import group_templates
+from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
+from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.station.model import Station
+from wind_sensors.station.signals import Recording
+
+FloatArray = npt.NDArray[np.float64]
+
+Verdict = Literal["none", "named", "ambiguous", "unknown", "inconclusive"]
+
+EQUAL_LIKELIHOOD = 3.0
+"""Explanations whose log-likelihoods lie closer are reported together."""
+
+EQUAL_SHARE = 0.04
+"""So are those that miss the winner by less than this share of its gain: the simulation is not
+exact enough to tell them apart."""
+
+REMAINDER_SCORE = 28.0
+REMAINDER_SHARE = 0.35
+REMAINDER_P = 0.05
+
+INTERVAL_FACTOR = 1.96
+MISMATCH_FACTOR = 1.25
+"""Intervals are wider than the noise alone would make them, for the simulation is not exact."""
+
+TOO_BLUNT = 6.0
+"""A record that shows no effect below this many smallest sizes is inconclusive."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One named effect.
+
+    Attributes:
+        term: The effect with its values and interval.
+        parameters: With intervals, by name.
+        located: Where the mismatch shows most.
+        share: Share of the whole misfit that the effect removes.
+        p: Probability of the location's score on a healthy day.
+        alternatives: Other effects and how far their log-likelihood lies behind.
+        proof: On held-out blocks; None for a member of an ambiguous set that did not win.
+        set_number: Number of the ambiguous set it belongs to, 0 for none.
+    """
+
+    term: Term
+    parameters: Mapping[str, Estimate]
+    located: Found
+    share: float
+    p: float
+    alternatives: tuple[tuple[str, str, float], ...]
+    proof: Proof | None
+    set_number: int = 0
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left over the baseline.
+
+    Attributes:
+        p: Probability of the largest remainder on a healthy day.
+        share: Its share of the whole misfit.
+        regions: Where it shows most.
+        description: For people.
+    """
+
+    p: float
+    share: float
+    regions: tuple[Found, ...]
+    description: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything that is said about one recording.
+
+    Attributes:
+        recording: Its name.
+        verdict: In one word.
+        calibrated: Whether healthy recordings stand behind the null.
+        findings: Named effects; of an ambiguous set, all members.
+        unexplained: What is left.
+        smallest_detectable: By effect and instrument: value and unit.
+        station: The station with the named physics.
+        baseline: What was normal.
+        comparison, naming, simulated, corrected: For reports.
+    """
+
+    recording: str
+    verdict: Verdict
+    calibrated: bool
+    findings: tuple[Finding, ...]
+    unexplained: Unexplained
+    smallest_detectable: Mapping[str, tuple[float, str]]
+    station: Station
+    baseline: Baseline
+    comparison: Comparison = field(repr=False)
+    naming: Naming = field(repr=False)
+    simulated: Simulated = field(repr=False)
+    corrected: Simulated = field(repr=False)
+    regions_before: tuple[Found, ...] = ()
+    bank: RegionBank | None = field(default=None, repr=False)
+
+
+def _estimates(naming: Naming) -> list[dict[str, Estimate]]:
+    out = []
+    place = 0
+    for term in naming.fit.terms:
+        found = {}
+        for parameter in term.effect.parameters:
+            variance = float(naming.fit.covariance[place, place])
+            error = INTERVAL_FACTOR * MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
+            value = term.values[parameter.name]
+            found[parameter.name] = Estimate(
+                value,
+                max(value - error, parameter.low),
+                min(value + error, parameter.high),
+                parameter.unit,
+            )
+            place += 1
+        out.append(found)
+    return out
+
+
+def _equal(naming: Naming) -> list[Alternative]:
+    """Alternatives to a single named effect that fit as well."""
+    if len(naming.fit.terms) != 1:
+        return []
+    limit = max(2.0 * EQUAL_LIKELIHOOD, EQUAL_SHARE * naming.gain)
+    own = naming.fit.terms[0]
+    out: list[Alternative] = []
+    for alternative in naming.alternatives:
+        term = alternative.fit.terms[-1]
+        if term.key == own.key or any(a.fit.terms[-1].key == term.key for a in out):
+            continue
+        if alternative.behind < limit:
+            out.append(alternative)
+    return out
+
+
+def _remainder(
+    naming: Naming, bank: RegionBank, calibration: float
+) -> tuple[float, float, float]:
+    """Largest remaining score, its p value, its share of what there was to explain."""
+    left = float(bank.scores(naming.fit.vector).max()) / calibration
+    share = left / (left + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
+    return left, bank.p_value(left), share
+
+
+def _description(found: Found) -> str:
+    channel = found.region.channel
+    if found.region.kind in {"spectrum", "statistic", "frequency"}:
+        return f"{channel}: {found.region.label} differs from the simulation"
+    sign = "above" if found.excess > 0.0 else "below"
+    return (
+        f"{channel}: measured {abs(found.excess):.2g} {found.unit} {sign} the simulation, "
+        f"{found.region.label}"
+    )
+
+
+def smallest_detectable(
+    searcher: Searcher, whitener: Whitener
+) -> dict[str, tuple[float, str, float]]:
+    """Smallest size of each effect that the recording could have shown.
+
+    Returns:
+        By `effect` (the most sensitive instrument): value, unit and size in units of the
+        smallest worth reporting.
+    """
+    signatures = searcher.white_signatures(whitener)
+    power = np.einsum("ij,ij->i", signatures, signatures)
+    out: dict[str, tuple[float, str, float]] = {}
+    for (effect_name, _), members in group_templates(searcher.bank.templates).items():
+        best = max(members, key=lambda k: float(power[k]))
+        if power[best] < 1e-6:
+            continue
+        template = searcher.bank.templates[best]
+        effect: Effect = template.effect
+        needed = ACCEPTED_GAIN + PENALTY_PER_PARAMETER * len(effect.parameters)
+        amplitude = float(np.sqrt(needed / power[best]))
+        graded = [p for p in effect.parameters if p.healthy is not None and p.minimum > 0.0]
+        moved = [p for p in graded if template.values[p.name] != p.healthy]
+        if not moved:
+            continue
+        parameter = moved[0]
+        healthy = parameter.healthy or 0.0
+        value = amplitude * abs(template.values[parameter.name] - healthy)
+        size = value / parameter.minimum
+        if effect_name not in out or size < out[effect_name][2]:
+            out[effect_name] = (value, parameter.unit, size)
+    return out
+
+
+def _verdict(
+    naming: Naming,
+    equal: list[Alternative],
+    remainder: tuple[float, float, float],
+    detectable: Mapping[str, tuple[float, str, float]],
+) -> Verdict:
+    left, p, share = remainder
+    structured = left > REMAINDER_SCORE and p < REMAINDER_P
+    if not naming.fit.terms:
+        if structured:
+            return "unknown"
+        sizes = sorted(size for _, _, size in detectable.values())
+        if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
+            return "inconclusive"
+        return "none"
+    if structured and share > REMAINDER_SHARE:
+        return "unknown"
+    return "ambiguous" if equal else "named"
+
+
+def diagnose(
+    recording: Recording,
+    baseline: Baseline,
+    effects: Mapping[str, Effect] | None = None,
+    workers: int = 1,
+    progress: Callable[[str, float], None] | None = None,
+) -> Diagnosis:
+    """Find the physics that a station file leaves out.
+
+    Args:
+        recording: With a reference wind.
+        baseline: What is normal for the station.
+        effects: Catalogue; None: all known effects.
+        workers: Processes.
+        progress: Called with a phase and the share of it that is done.
+
+    Raises:
+        UserError: The recording cannot be compared with its station.
+    """
+    known = catalogue() if effects is None else effects
+
+    def report(phase: str) -> Callable[[float], None]:
+        return lambda share: progress(phase, share) if progress else None
+
+    comparison = prepare(recording, baseline.station)
+    guesses = {
+        key: terms for key, terms in guesses_of(comparison, baseline.station).items()
+        if key[0] in known
+    }  # fmt: skip
+    searcher = searcher_of(
+        comparison, baseline, known, guesses, workers, report("simulating the catalogue")
+    )
+    naming = name(searcher, report("fitting effects"))
+    whitener = naming.whitener
+    bank = region_bank(whitener, searcher.bank.without)
+    report("locating")(0.5)
+    before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
+    after = strongest(whitener, bank, naming.fit.vector, naming.fit.simulated)
+    calibration = max(1.0, baseline.remainder_scale)
+    remainder = _remainder(naming, bank, calibration)
+    detectable = smallest_detectable(searcher, whitener)
+    equal = _equal(naming)
+    verdict = _verdict(naming, equal, remainder, detectable)
+    report("proving")(0.2)
+    findings = _findings(naming, equal, before, bank, baseline) if verdict in {
+        "named", "ambiguous"
+    } else ()  # fmt: skip
+    report("proving")(1.0)
+    named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
+    station = planted(baseline.station, named)
+    description = _description(after[0]) if remainder[1] < REMAINDER_P else ""
+    return Diagnosis(
+        recording=recording.name,
+        verdict=verdict,
+        calibrated=baseline.calibrated,
+        findings=findings,
+        unexplained=Unexplained(remainder[1], remainder[2], tuple(after), description),
+        smallest_detectable={k: (v, unit) for k, (v, unit, _) in detectable.items()},
+        station=station,
+        baseline=baseline,
+        comparison=comparison,
+        naming=naming,
+        simulated=searcher.bank.without,
+        corrected=naming.fit.simulated if named else searcher.bank.without,
+        regions_before=tuple(before),
+        bank=bank,
+    )
+
+
+def _findings(
+    naming: Naming,
+    equal: list[Alternative],
+    before: list[Found],
+    bank: RegionBank,
+    baseline: Baseline,
+) -> tuple[Finding, ...]:
+    whitener = naming.whitener
+    estimates = _estimates(naming)
+    behind = tuple(
+        (a.fit.terms[-1].effect.name, a.fit.terms[-1].instrument, 0.5 * a.behind)
+        for a in naming.alternatives
+        if a.fit.terms[-1].key not in {t.key for t in naming.fit.terms}
+    )
+    placebo = naming.alternatives[0].fit.terms if naming.alternatives else ()
+    proof = prove(whitener, baseline.station, naming.fit.terms, placebo)
+    misfit = float(naming.nothing @ naming.nothing)
+    out = []
+    for k, term in enumerate(naming.fit.terms):
+        rest = [t for t in naming.fit.terms if t is not term]
+        if rest:
+            vector = whitener.of_station(planted(baseline.station, rest))
+            gain = float(vector @ vector) - naming.fit.cost
+        else:
+            gain = naming.gain
+        own = _location(naming, bank, before, term)
+        share = gain / max(misfit - 0.95 * naming.nothing.size, gain)
+        out.append(
+            Finding(
+                term, estimates[k], own, float(np.clip(share, 0.0, 1.0)),
+                bank.p_value(own.score), behind, proof, 1 if equal else 0,
+            )
+        )  # fmt: skip
+    for alternative in equal:
+        term = alternative.fit.terms[-1]
+        values = {
+            p.name: Estimate(term.values[p.name], float("nan"), float("nan"), p.unit)
+            for p in term.effect.parameters
+        }
+        out.append(
+            Finding(
+                term, values, out[0].located, out[0].share, out[0].p,
+                ((naming.fit.terms[0].effect.name, naming.fit.terms[0].instrument,
+                  -0.5 * alternative.behind),),
+                None, 1,
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _location(naming: Naming, bank: RegionBank, before: list[Found], term: Term) -> Found:
+    """The strongest region in a channel of the term's instrument."""
+    comparison = naming.whitener.comparison
+    channels = {
+        c.name
+        for c in comparison.channels
+        if c.instrument in comparison.affected(comparison.station, term.instrument)
+    }
+    every = strongest(
+        naming.whitener, bank, naming.nothing,
+        comparison.simulate(comparison.station), len(bank.regions),
+    )  # fmt: skip
+    for found in every:
+        if found.region.channel in channels:
+            return found
+    return before[0]
+
+
+def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The content of `diagnosis.json`."""
+    length = diagnosis.comparison.grid.n * diagnosis.comparison.grid.dt
+    return {
+        "recording": diagnosis.recording,
+        "verdict": diagnosis.verdict,
+        "null_calibrated": diagnosis.calibrated,
+        "findings": [_finding_json(f, length) for f in diagnosis.findings],
+        "unexplained": {
+            "p": round(diagnosis.unexplained.p, 4),
+            "share": round(diagnosis.unexplained.share, 4),
+            "description": diagnosis.unexplained.description,
+            "regions": [
+                {
+                    "channel": f.region.channel, "kind": f.region.kind, "label": f.region.label,
+                    "excess": f.excess, "unit": f.unit, "score": f.score,
+                }
+                for f in diagnosis.unexplained.regions
+            ],
+        },
+        "smallest_detectable": {
+            key: {"value": _rounded(value), "unit": unit}
+            for key, (value, unit) in diagnosis.smallest_detectable.items()
+        },
+    }  # fmt: skip
+
+
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.5g}") if np.isfinite(value) else None
+
+
+def _finding_json(finding: Finding, length: float) -> dict[str, Any]:
+    term = finding.term
+    begin, end = term.interval
+    region = finding.located.region
+    out: dict[str, Any] = {
+        "effect": term.effect.name,
+        "instrument": term.instrument,
+        "located": {
+            "channel": region.channel.partition("/")[2],
+            "time": [begin, length if end is None else end],
+            "region": {region.kind: [region.low, region.high]},
+            "excess": _rounded(finding.located.excess),
+            "unit": finding.located.unit,
+            "share": _rounded(finding.share),
+            "p": finding.p,
+        },
+        "physics": term.effect.meaning,
+        "equation": term.effect.equation,
+        "source": term.effect.source,
+        "parameters": {
+            key: {
+                "value": _rounded(e.value), "low": _rounded(e.low), "high": _rounded(e.high),
+                "unit": e.unit,
+            }
+            for key, e in finding.parameters.items()
+        },
+        "relative_size": _rounded(term.relative_size),
+        "interval_s": None if term.interval == ALWAYS else [begin, end],
+        "alternatives": [
+            {"effect": name, "instrument": instrument, "log_likelihood_behind": _rounded(behind)}
+            for name, instrument, behind in finding.alternatives[:6]
+        ],
+        "separate_by": {
+            name: term.effect.confusable[name]
+            for name, _, _ in finding.alternatives
+            if name in term.effect.confusable
+        },
+    }  # fmt: skip
+    if finding.set_number:
+        out["set"] = finding.set_number
+    if finding.proof is not None:
+        proof = finding.proof
+        out["proof"] = {
+            "score_before": _rounded(proof.before),
+            "score_after": _rounded(proof.after),
+            "score_floor": _rounded(proof.floor),
+            "excess_removed": _rounded(proof.excess_removed),
+            "interval": [_rounded(proof.low), _rounded(proof.high)],
+            "placebo_removed": (
+                None if proof.placebo_removed is None else _rounded(proof.placebo_removed)
+            ),
+        }
+    return out

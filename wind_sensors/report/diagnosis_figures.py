@@ -1,0 +1,126 @@
+"""Figures of a diagnosis."""
+
+from __future__ import annotations
+
+import io
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.verdict import Diagnosis
+from wind_sensors.report import style
+
+FloatArray = npt.NDArray[np.float64]
+
+_SMOOTHING = 15.0
+_LEAST_BINS = 40
+
+
+def as_svg(made: Figure) -> str:
+    """A figure as an SVG element for a page."""
+    text = io.StringIO()
+    with style.house():
+        made.savefig(text, format="svg", metadata={"Date": None})
+    content = text.getvalue()
+    return content[content.index("<svg") :]
+
+
+def _series(diagnosis: Diagnosis, channel: Channel) -> tuple[FloatArray, FloatArray, str]:
+    """Residuals before and after, and their unit."""
+    comparison = diagnosis.comparison
+    measured = comparison.measured.series[channel.name]
+    before = measured - diagnosis.simulated.series[channel.name]
+    after = measured - diagnosis.corrected.series[channel.name]
+    if channel.kind == "vane_angle":
+        return np.degrees(before / comparison.speed), np.degrees(after / comparison.speed), "deg"
+    return before, after, "m/s"
+
+
+def _smooth(values: FloatArray, width: int) -> FloatArray:
+    return np.convolve(values, np.full(width, 1.0 / width), mode="valid")
+
+
+def _binned(
+    of: FloatArray, values: FloatArray, edges: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Bin middles, means and standard errors (of quarter-minute means)."""
+    middles, means, errors = [], [], []
+    for low, high in itertools.pairwise(edges):
+        inside = (of >= low) & (of < high)
+        if np.count_nonzero(inside) < _LEAST_BINS:
+            continue
+        chosen = values[inside]
+        middles.append(0.5 * (low + high))
+        means.append(float(np.mean(chosen)))
+        errors.append(float(np.std(chosen)) / np.sqrt(max(chosen.size / 50.0, 1.0)))
+    return np.array(middles), np.array(means), np.array(errors)
+
+
+def residual_figure(diagnosis: Diagnosis, channel: Channel) -> Figure:
+    """Residual of a channel over time, direction, speed and frequency, before and after."""
+    comparison = diagnosis.comparison
+    before, after, unit = _series(diagnosis, channel)
+    corrected = diagnosis.corrected is not diagnosis.simulated
+    width = max(int(_SMOOTHING / comparison.grid.dt), 1)
+    at = comparison.grid.centres
+    on_platform = comparison.drive.motion is not None
+    heading = np.degrees(comparison.wind_from)
+    clockwise = np.mod(-heading if on_platform else 90.0 - heading, 360.0)
+    with style.house():
+        made = Figure(figsize=(9.0, 6.6), layout="constrained")
+        grid = made.add_gridspec(2, 3)
+        over_time = made.add_subplot(grid[0, :])
+        by_direction = made.add_subplot(grid[1, 0])
+        by_speed = made.add_subplot(grid[1, 1])
+        by_frequency = made.add_subplot(grid[1, 2])
+        cut = at[width - 1 :] - 0.5 * (width - 1) * comparison.grid.dt
+        over_time.plot(cut, _smooth(before, width), color=style.RAW, label="before")
+        if corrected:
+            over_time.plot(cut, _smooth(after, width), color=style.CORRECTED, label="with it")
+            over_time.legend(loc="upper right", ncols=2)
+        over_time.axhline(0.0, color=style.MUTED, linewidth=0.8)
+        over_time.set_title(f"Recorded minus simulated, {channel.name.replace('/', ', ')}")
+        over_time.set_xlabel(f"time in s ({_SMOOTHING:.0f} s means)")
+        over_time.set_ylabel(unit)
+        speeds = np.quantile(comparison.speed, np.linspace(0.0, 1.0, 9))
+        for axes, of, edges, label in (
+            (by_direction, clockwise, np.arange(0.0, 361.0, 10.0),
+             "wind from, deg " + ("from the bow" if on_platform else "from north")),
+            (by_speed, comparison.speed, speeds, "wind speed in m/s"),
+        ):  # fmt: skip
+            pairs = [(before, style.RAW)]
+            if corrected:
+                pairs.append((after, style.CORRECTED))
+            for values, colour in pairs:
+                x, y, e = _binned(of, values, edges)
+                axes.errorbar(x, y, 2.0 * e, fmt="o", color=colour, markersize=3.5, linewidth=1.0)
+            axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
+            axes.set_xlabel(label)
+        by_direction.set_ylabel(unit)
+        _spectra(diagnosis, channel, by_frequency, corrected=corrected)
+    return made
+
+
+def _spectra(diagnosis: Diagnosis, channel: Channel, axes: object, *, corrected: bool) -> None:
+    from matplotlib.axes import Axes
+
+    assert isinstance(axes, Axes)
+    comparison = diagnosis.comparison
+    measured = comparison.measured.cosine[channel.name]
+    edges = spectra.band_edges(measured.size)
+    frequency = 0.5 * (edges[:-1] + edges[1:]) / (2.0 * comparison.grid.n * comparison.grid.dt)
+    power = spectra.band_means(measured**2, edges)
+    pairs = [(diagnosis.simulated, style.RAW)]
+    if corrected:
+        pairs.append((diagnosis.corrected, style.CORRECTED))
+    for simulated, colour in pairs:
+        other = spectra.band_means(simulated.cosine[channel.name] ** 2, edges)
+        axes.semilogx(frequency, power / np.maximum(other, 1e-12), "o-", color=colour, ms=3.0)
+    axes.axhline(1.0, color=style.MUTED, linewidth=0.8)
+    axes.set_ylim(0.0, 3.0)
+    axes.set_xlabel("frequency in Hz")
+    axes.set_ylabel("recorded / simulated power")

@@ -1,0 +1,225 @@
+"""The page of a diagnosis: one self-contained file, readable in a minute."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.verdict import Diagnosis, Estimate, Finding
+from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
+
+_STYLE = """
+:root{--ink:#22303c;--muted:#5d6b77;--line:#e3e8ec;--blue:#1f6fb2;--orange:#b96a1c;--green:#3d7f52}
+*{box-sizing:border-box}
+body{margin:0;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:#f6f8f9}
+main{max-width:60rem;margin:0 auto;padding:1rem}
+section,header{background:#fff;border:1px solid var(--line);border-radius:10px;
+padding:1rem 1.25rem;margin:0 0 1rem}
+h1{font-size:1.5rem;margin:.2rem 0 .4rem;overflow-wrap:anywhere}
+h2{font-size:1.1rem;margin:0 0 .5rem}
+p{margin:.3rem 0 .6rem;max-width:65ch}.muted{color:var(--muted)}
+.verdict{border-left:8px solid var(--blue)}.none{border-left-color:var(--green)}
+.unknown,.ambiguous,.inconclusive{border-left-color:var(--orange)}
+code,.eq{font-family:ui-monospace,monospace;font-size:.92em;overflow-wrap:anywhere}
+.eq{display:block;background:#f2f5f7;border-radius:6px;padding:.5rem .7rem;margin:.4rem 0}
+table{border-collapse:collapse;width:100%;font-size:.95rem}
+th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
+td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+.scroll{overflow-x:auto}svg{max-width:100%;height:auto}
+.bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
+.bar i{display:block;height:100%;background:var(--blue)}
+"""
+
+_VERDICTS = {
+    "none": "Nothing is wrong that this recording could show",
+    "named": "The missing physics has a name",
+    "ambiguous": "The missing physics is one of these",
+    "unknown": "Something is wrong that no known effect explains",
+    "inconclusive": "Too short or too calm to tell",
+}
+
+
+def _words(effect: str) -> str:
+    return effect.replace("_", " ")
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "?"
+
+
+def _estimate(name: str, e: Estimate) -> str:
+    unit = "" if e.unit == "1" else f" {e.unit}"
+    interval = ""
+    if np.isfinite(e.low):
+        interval = f" ({_number(e.low)} to {_number(e.high)})"
+    return f"{_words(name)} {_number(e.value)}{unit}{interval}"
+
+
+def _headline(diagnosis: Diagnosis) -> str:
+    if diagnosis.findings and diagnosis.verdict == "named":
+        names = " and ".join(
+            f"{_words(f.term.effect.name)} ({f.term.instrument})" for f in diagnosis.findings
+        )
+        return names[0].upper() + names[1:]
+    if diagnosis.findings:
+        names = " or ".join(_words(f.term.effect.name) for f in diagnosis.findings)
+        return names[0].upper() + names[1:]
+    return _VERDICTS[diagnosis.verdict]
+
+
+def _summary(diagnosis: Diagnosis) -> str:
+    lines = [f"<p class='muted'>{escape(_VERDICTS[diagnosis.verdict])}.</p>"]
+    for finding in diagnosis.findings:
+        term = finding.term
+        text = "; ".join(_estimate(k, e) for k, e in finding.parameters.items())
+        when = "all the time"
+        if term.interval != ALWAYS:
+            begin, end = term.interval
+            when = f"from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
+        lines.append(
+            f"<p><b>{escape(_words(term.effect.name))}</b>, {escape(term.instrument)}: "
+            f"{escape(term.effect.meaning)}<br>{escape(text)}; {when}.</p>"
+        )
+    if diagnosis.verdict == "unknown":
+        lines.append(f"<p>{escape(diagnosis.unexplained.description)}</p>")
+    if not diagnosis.calibrated:
+        lines.append(
+            "<p><b>The null is not calibrated:</b> no healthy recording of this station was "
+            "given, so what is normal was taken from certificate tolerances.</p>"
+        )
+    return "".join(lines)
+
+
+def _physics(finding: Finding) -> str:
+    effect = finding.term.effect
+    rows = "".join(
+        f"<tr><td>{escape(_words(key))}</td><td class='n'>{_number(e.value)}</td>"
+        f"<td class='n'>{_number(e.low)} to {_number(e.high)}</td><td>{escape(e.unit)}</td></tr>"
+        for key, e in finding.parameters.items()
+    )
+    region = finding.located.region
+    return (
+        f"<section><h2>The physics: {escape(_words(effect.name))}</h2>"
+        f"<span class='eq'>{escape(effect.equation)}</span>"
+        f"<p class='muted'>{escape(effect.source)}. It shows in: {escape(effect.region)}.</p>"
+        f"<div class='scroll'><table><tr><th>parameter</th><th>value</th><th>95 % interval</th>"
+        f"<th>unit</th></tr>{rows}</table></div>"
+        f"<p>The mismatch is largest in <b>{escape(region.label)}</b> ({escape(region.channel)}): "
+        f"{_number(finding.located.excess)} {escape(finding.located.unit)}; p = {finding.p:.3g} "
+        f"after looking everywhere; {100.0 * finding.share:.0f} % of the whole misfit.</p>"
+        "</section>"
+    )
+
+
+def _proof(finding: Finding) -> str:
+    proof = finding.proof
+    if proof is None:
+        return ""
+    share = float(np.clip(proof.excess_removed, 0.0, 1.0))
+    placebo = ""
+    if proof.placebo_removed is not None:
+        placebo = (
+            f"<p>The next-best explanation removes {100.0 * proof.placebo_removed:.0f} % on the "
+            "same blocks.</p>"
+        )
+    return (
+        "<section><h2>The proof, on data that were not fitted</h2>"
+        "<p>Every other block of the record was fitted, the blocks between were scored, and the "
+        "other way round, with gaps between them.</p>"
+        f"<div class='bar'><i style='width:{100.0 * share:.0f}%'></i></div>"
+        f"<p><b>{100.0 * proof.excess_removed:.0f} %</b> of the excess misfit disappears "
+        f"(95 % interval {100.0 * proof.low:.0f} to {100.0 * proof.high:.0f} %). Whitened misfit "
+        f"{proof.before:.3f} before, {proof.after:.3f} after; {proof.floor:.3f} on the fitted "
+        f"blocks; 1 is a healthy day.</p>{placebo}</section>"
+    )
+
+
+def _next(diagnosis: Diagnosis) -> str:
+    lines = []
+    for finding in diagnosis.findings:
+        effect = finding.term.effect
+        others = {name for name, _, _ in finding.alternatives}
+        for name, measurement in effect.confusable.items():
+            mark = " (close here)" if name in others else ""
+            lines.append(
+                f"<li>against {escape(_words(name))}{mark}: {escape(measurement)}</li>"
+            )
+    if diagnosis.verdict == "unknown":
+        lines.append(
+            "<li>record again when wind speed and direction differ, to see what it follows</li>"
+        )
+    if not lines:
+        return ""
+    return (
+        "<section><h2>What to measure next</h2><ul>"
+        + "".join(dict.fromkeys(lines))
+        + "</ul></section>"
+    )
+
+
+def _left(diagnosis: Diagnosis) -> str:
+    unexplained = diagnosis.unexplained
+    rows = "".join(
+        f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
+        f"<td class='n'>{_number(f.excess)} {escape(f.unit)}</td>"
+        f"<td class='n'>{_number(f.score)}</td></tr>"
+        for f in unexplained.regions[:4]
+    )
+    return (
+        "<section><h2>What is left</h2>"
+        f"<p>p = {unexplained.p:.3g} for the largest remainder.</p><div class='scroll'><table>"
+        "<tr><th>channel</th><th>where</th><th>residual</th><th>score</th></tr>"
+        f"{rows}</table></div></section>"
+    )
+
+
+def _detectable(diagnosis: Diagnosis) -> str:
+    known = catalogue()
+    rows = "".join(
+        f"<tr><td>{escape(_words(name))}</td><td class='n'>{_number(value)} "
+        f"{'' if unit == '1' else escape(unit)}</td>"
+        f"<td>{escape(known[name].meaning if name in known else '')}</td></tr>"
+        for name, (value, unit) in sorted(diagnosis.smallest_detectable.items())
+    )
+    return (
+        "<section><details><summary>The smallest size of each effect that this recording could "
+        "have shown</summary><div class='scroll'><table><tr><th>effect</th><th>size</th>"
+        f"<th>meaning</th></tr>{rows}</table></div></details></section>"
+    )
+
+
+def page(diagnosis: Diagnosis) -> str:
+    """The report as one HTML file without outside references."""
+    figures = []
+    wanted = {f.located.region.channel for f in diagnosis.findings} or {
+        f.region.channel for f in diagnosis.unexplained.regions[:1]
+    }
+    for channel in diagnosis.comparison.channels:
+        if channel.name in wanted:
+            figures.append(as_svg(residual_figure(diagnosis, channel)))
+    healthy = ", ".join(diagnosis.baseline.recordings) or "none"
+    body = [
+        f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
+        f"{escape(diagnosis.recording)} · wind diagnose</div>"
+        f"<h1>{escape(_headline(diagnosis))}</h1>{_summary(diagnosis)}</header>",
+        "<section><h2>Before and after</h2>"
+        "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
+        "described. Blue: with the named physics. Bars are two standard errors.</p>"
+        + "".join(figures)
+        + "</section>",
+        *(_physics(f) for f in diagnosis.findings),
+        *(_proof(f) for f in diagnosis.findings[:1]),
+        _next(diagnosis),
+        _left(diagnosis),
+        _detectable(diagnosis),
+        f"<p class='muted'>Healthy recordings behind the baseline: {escape(healthy)}.</p>",
+    ]
+    return (
+        "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width,initial-scale=1'>"
+        f"<title>Diagnosis of {escape(diagnosis.recording)}</title><style>{_STYLE}</style></head>"
+        f"<body><main>{''.join(body)}</main></body></html>\n"
+    )
