@@ -90,13 +90,14 @@ class CircumstanceSource:
                 needs it.
 
         Returns:
-            Shape (n, 19), see `forward`.
+            Shape (n, 22), see `forward`.
         """
         rows = np.zeros((times.size, forward.CIRCUMSTANCES))
         self._air(rows)
         platform = self.station.platform
         if platform is None:
             rows[:, 3:12] = self._mast_rotation
+            rows[:, forward.MOUNT_GRAVITY_Z] = -STANDARD_GRAVITY
         elif self._platform_times.size and times.size:
             self._moving(rows, times, platform, wind)
         else:
@@ -132,11 +133,15 @@ class CircumstanceSource:
             moving = moving - rotor_downwash(platform.downwash, felt)
         rows[:, 0:3] = np.einsum("nij,nj->ni", motion.to_earth, moving)
         rows[:, 3:12] = np.einsum("nij,jk->nik", motion.to_earth, rotation).reshape(-1, 9)
-        rows[:, forward.MOUNT_YAW_RATE] = motion.angular_rate @ rotation[:, 2]
+        turning = motion.angular_rate @ rotation
+        rows[:, forward.MOUNT_ROLL_RATE] = turning[:, 0]
+        rows[:, forward.MOUNT_PITCH_RATE] = turning[:, 1]
+        rows[:, forward.MOUNT_YAW_RATE] = turning[:, 2]
         if any(getattr(i, "imbalance", 0.0) for i in self.station.instruments):
             felt_gravity = self._gravity(track, platform, arm, rotation, times)
             rows[:, forward.MOUNT_GRAVITY_X] = felt_gravity[:, 0]
             rows[:, forward.MOUNT_GRAVITY_Y] = felt_gravity[:, 1]
+            rows[:, forward.MOUNT_GRAVITY_Z] = felt_gravity[:, 2]
         guess = ~sample.known
         self.guesswork += int(np.count_nonzero(guess))
         rows[:, forward.VELOCITY_VARIANCE] = np.where(
@@ -194,7 +199,7 @@ def with_mount_covariance(
     Args:
         covariance: [m^2/s^2], shape (n, 3, 3).
         wind: ENU [m/s], shape (n, 3).
-        rows: Circumstances, shape (n, 19).
+        rows: Circumstances, shape (n, 22).
 
     Returns:
         Shape (n, 3, 3).

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -23,9 +25,58 @@ def vanes_of(station: Station) -> tuple[Vane, ...]:
     return tuple(i for i in station.instruments if isinstance(i, Vane))
 
 
-def bivanes_of(station: Station) -> tuple[Bivane, ...]:
-    """Bivanes in the station's order."""
-    return tuple(i for i in station.instruments if isinstance(i, Bivane))
+class NoseAxis(NamedTuple):
+    """An axis about which a vane or bivane turns, with a signal of its own.
+
+    Attributes:
+        name: Of the signal: `<vane>`, `<bivane>` (azimuth), `<bivane>/elevation`.
+        instrument: The vane or bivane.
+        azimuth: For an elevation the index of the azimuth that turns it; -1 for an azimuth.
+    """
+
+    name: str
+    instrument: Vane | Bivane
+    azimuth: int
+
+
+def axes_of(station: Station) -> tuple[NoseAxis, ...]:
+    """Axes of all vanes, then of all bivanes, in the station's order."""
+    axes = [NoseAxis(v.name, v, -1) for v in vanes_of(station)]
+    for bivane in station.instruments:
+        if isinstance(bivane, Bivane):
+            axes.append(NoseAxis(bivane.name, bivane, -1))
+            axes.append(NoseAxis(f"{bivane.name}/elevation", bivane, len(axes) - 1))
+    return tuple(axes)
+
+
+def fixed_propellers_of(station: Station) -> tuple[Propeller, ...]:
+    """Propellers that do not turn with the wind."""
+    return tuple(
+        i for i in station.instruments if isinstance(i, Propeller) and not i.mounted_on
+    )
+
+
+def array_axes(propellers: tuple[Propeller, ...]) -> FloatArray:
+    """Unit vectors of fixed propellers in the sensor frame, shape (propellers, 3)."""
+    given = [p.axis if p.axis is not None else (1.0, 0.0, 0.0) for p in propellers]
+    axes = np.array(given, dtype=np.float64).reshape(len(propellers), 3)
+    out: FloatArray = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    return out
+
+
+def is_array(station: Station) -> bool:
+    """Whether fixed propellers alone must tell the wind: nothing points into it."""
+    axes = array_axes(fixed_propellers_of(station))
+    spanned = bool(axes.size) and int(np.linalg.matrix_rank(axes[:, :2], tol=0.05)) == 2
+    return not axes_of(station) and spanned
+
+
+def measures_vertical(station: Station) -> bool:
+    """Whether the station's signals tell the vertical wind."""
+    if any(isinstance(i, Bivane) for i in station.instruments):
+        return True
+    axes = array_axes(fixed_propellers_of(station))
+    return bool(axes.size) and int(np.linalg.matrix_rank(axes, tol=0.05)) == 3
 
 
 def sensor_yaw(station: Station) -> float:
@@ -40,8 +91,7 @@ def _mounting(rotor: Rotor, vanes: tuple[Vane, ...]) -> list[float]:
         carrier = [v.name for v in vanes].index(rotor.mounted_on)
         row = [ON_VANE, carrier, rotor.distance_to_vane_axis, 0.0, 0.0, 0.0]
     elif isinstance(rotor, Propeller):
-        axis = np.asarray(rotor.axis if rotor.axis is not None else (1.0, 0.0, 0.0), dtype=float)
-        row = [FIXED_AXIS, 0, 0.0, *(axis / np.linalg.norm(axis))]
+        row = [FIXED_AXIS, 0, 0.0, *array_axes((rotor,))[0]]
     else:
         row = [CUP, 0, 0.0, 0.0, 0.0, 0.0]
     return [float(v) for v in (*row, rotor.reference_density)]
@@ -53,9 +103,9 @@ def _lean(tilt_deg: tuple[float, float]) -> FloatArray:
 
 
 def instruments_of(station: Station) -> Instruments:
-    """Constant arrays of all rotors and vanes of a station (without changes)."""
-    rotors, vanes = rotors_of(station), vanes_of(station)
-    every: tuple[Instrument, ...] = (*rotors, *vanes)
+    """Constant arrays of all rotors and nose axes of a station (without changes)."""
+    rotors, vanes, axes = rotors_of(station), vanes_of(station), axes_of(station)
+    every: tuple[Instrument, ...] = (*rotors, *(a.instrument for a in axes))
     count = len(every)
     most = max([len(i.wake_shadows) for i in every], default=0)
     shadow = np.zeros((count, max(most, 1), 3))
@@ -91,8 +141,9 @@ def instruments_of(station: Station) -> Instruments:
         rotor=rotor_rows,
         response=tables,
         mounting=mounting,
-        vane=np.array([list(vane_parameters(v)) for v in vanes]).reshape(len(vanes), 7),
-        vane_density=np.array([v.reference_density for v in vanes]),
+        vane=np.array([list(vane_parameters(a.instrument)) for a in axes]).reshape(len(axes), 7),
+        vane_density=np.array([a.instrument.reference_density for a in axes], dtype=np.float64),
+        azimuth=np.array([a.azimuth for a in axes], dtype=np.int64),
         shadow=shadow,
         distortion=distortion,
         lean=lean,

@@ -28,7 +28,7 @@ class FilterState(NamedTuple):
         covariance: Shape (n, n).
         clock: Time of the state [ns]; time up to which estimates have been delivered [ns]; steps
             in the ring since the start; blocks since the start.
-        circumstances: At the time of the state, shape (19,).
+        circumstances: At the time of the state, shape (22,).
         levels: Turbulence levels, shape (4,), see `turbulence_process`.
         level_information: Running expected scores of the levels.
         edge_variance: Variance of an edge's place [slots^2], one per rotor.
@@ -92,7 +92,7 @@ class Ring(NamedTuple):
         noise_gain: Derivative of the instruments' states by the new wind, shape (c, i, 3).
         noise: Variance added to each wind state along and across, shape (c, pairs, 2).
         heading: Unit vector of the mean wind, shape (c, 2).
-        circumstances: Shape (c, 19).
+        circumstances: Shape (c, 22).
         mean, covariance: After the step, at output instants, shape (c, n) and (c, n, n).
     """
 

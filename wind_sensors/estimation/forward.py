@@ -34,9 +34,13 @@ AIR_DENSITY = 15
 AIR_TEMPERATURE = 16
 VELOCITY_VARIANCE = 17
 ATTITUDE_VARIANCE = 18
-CIRCUMSTANCES = 19
+MOUNT_ROLL_RATE = 19
+MOUNT_PITCH_RATE = 20
+MOUNT_GRAVITY_Z = 21
+CIRCUMSTANCES = 22
 """Columns of the circumstances of an instant: velocity of the sensor (ENU), rotation of the sensor
-frame into ENU (by rows), yaw rate, gravity felt along x and y, air, variances of the mount."""
+frame into ENU (by rows), yaw rate, gravity felt along x and y, air, variances of the mount, roll
+and pitch rate, gravity felt along z."""
 
 
 class Instruments(NamedTuple):
@@ -47,8 +51,9 @@ class Instruments(NamedTuple):
         response: Angular response tables, shape (rotors, 181).
         mounting: Kind, index of the carrying vane, arm [m], axis x, y, z, reference density
             [kg/m^3]; shape (rotors, 7).
-        vane: `VaneParameters`, shape (vanes, 7).
+        vane: `VaneParameters` of each nose axis, shape (vanes, 7).
         vane_density: Reference densities [kg/m^3], shape (vanes,).
+        azimuth: For the elevation of a bivane the index of its azimuth, else -1; shape (vanes,).
         shadow: Wake shadows of rotors then vanes: bearing of its middle against x [rad], depth,
             width [rad]; shape (rotors + vanes, shadows, 3).
         distortion: cos, sin, cos 2, sin 2 of the speed-up; shape (rotors + vanes, 4).
@@ -61,6 +66,7 @@ class Instruments(NamedTuple):
     mounting: FloatArray
     vane: FloatArray
     vane_density: FloatArray
+    azimuth: npt.NDArray[np.int64]
     shadow: FloatArray
     distortion: FloatArray
     lean: FloatArray
@@ -181,11 +187,22 @@ def advance_station(
         j = 2 * (rotors + v)
         here_0 = at_instrument(s, rotors + v, felt_0)
         here_1 = at_instrument(s, rotors + v, felt_1)
+        x_0, y_0, turn_0 = here_0[0], here_0[1], c_0[MOUNT_YAW_RATE]
+        x_1, y_1, turn_1 = here_1[0], here_1[1], c_1[MOUNT_YAW_RATE]
+        pull_x, pull_y = c_1[MOUNT_GRAVITY_X], c_1[MOUNT_GRAVITY_Y]
+        if s.azimuth[v] >= 0:
+            # In the vertical plane through the nose: along it, and downwards across it.
+            a = 2 * (rotors + s.azimuth[v])
+            cos_0, sin_0 = math.cos(state[a]), math.sin(state[a])
+            cos_1, sin_1 = math.cos(out[a]), math.sin(out[a])
+            x_0, y_0 = x_0 * cos_0 + y_0 * sin_0, -here_0[2]
+            x_1, y_1 = x_1 * cos_1 + y_1 * sin_1, -here_1[2]
+            turn_0 = c_0[MOUNT_PITCH_RATE] * cos_0 - c_0[MOUNT_ROLL_RATE] * sin_0
+            turn_1 = c_1[MOUNT_PITCH_RATE] * cos_1 - c_1[MOUNT_ROLL_RATE] * sin_1
+            pull_x, pull_y = pull_x * cos_1 + pull_y * sin_1, -c_1[MOUNT_GRAVITY_Z]
         phi, rate = advance_vane(
-            vane_of(s, v), state[j], state[j + 1], (here_0[0], here_1[0]), (here_0[1], here_1[1]),
-            (c_0[MOUNT_YAW_RATE], c_1[MOUNT_YAW_RATE]),
-            (c_1[MOUNT_GRAVITY_X], c_1[MOUNT_GRAVITY_Y]),
-            c_1[AIR_DENSITY] / s.vane_density[v], dt,
+            vane_of(s, v), state[j], state[j + 1], (x_0, x_1), (y_0, y_1), (turn_0, turn_1),
+            (pull_x, pull_y), c_1[AIR_DENSITY] / s.vane_density[v], dt,
         )  # fmt: skip
         out[j] = phi
         out[j + 1] = rate

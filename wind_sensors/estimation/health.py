@@ -11,7 +11,7 @@ from wind_sensors.estimation.intake import (
     InputRecord,
     Intake,
 )
-from wind_sensors.estimation.outputs import HealthItem, HealthLevel
+from wind_sensors.estimation.outputs import HealthItem, HealthLevel, WindowStatistics
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.station.model import Station
 
@@ -106,3 +106,14 @@ def clock_health(intake: Intake, unknown: dict[str, int]) -> HealthItem:
             "clock", HealthLevel.WARN, f"Messages of unknown instruments: {names}.", values
         )
     return HealthItem("clock", HealthLevel.OK, "Stamps run forward.", values)
+
+
+def bias_health(window: WindowStatistics) -> HealthItem:
+    """The biases of the latest window, one key each, relative to the mean speed."""
+    values = {
+        name: f"{100.0 * term.value:+.3f} +- {100.0 * term.uncertainty:.3f} %"
+        for name, term in window.bias_terms.items()
+    }
+    return HealthItem(
+        "bias", HealthLevel.OK, f"Removed from the mean of {window.instrument}.", values
+    )

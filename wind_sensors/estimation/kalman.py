@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from wind_sensors.estimation import forward
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
-from wind_sensors.estimation.constants import instruments_of, rotors_of, vanes_of
+from wind_sensors.estimation.constants import NoseAxis, axes_of, instruments_of, rotors_of
 from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
 from wind_sensors.estimation.filter_state import (
     EDGE,
@@ -34,7 +34,7 @@ from wind_sensors.estimation.start import start_filter
 from wind_sensors.estimation.turbulence_process import UNRESOLVED_VARIANCE, WIND_STATES
 from wind_sensors.estimation.wind_state import wind_of
 from wind_sensors.station.changes import Segment, segments
-from wind_sensors.station.model import Cup, Propeller, Station, Vane
+from wind_sensors.station.model import Cup, Propeller, Station
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -91,11 +91,11 @@ class KalmanCore:
         self._segment: Segment = self._segments.pop(0)
         self._source = CircumstanceSource(self._segment.station, settings.use_air)
         self._enter(self._segment.station)
-        rotors, vanes = len(self._rotors), len(self._vanes)
+        rotors, vanes = len(self._rotors), len(self._axes)
         self.filter: FilterState = empty_filter(rotors, vanes)
         self.filter.height[0] = station.recording.measuring_height
         self.rotor_names = [r.name for r in self._rotors]
-        self.vane_names = [v.name for v in self._vanes]
+        self.vane_names = [v.name for v in self._axes]
         for i, rotor in enumerate(self._rotors):
             self.filter.slots[i] = rotor.pulses_per_revolution
             self.filter.stride[i] = useful_stride(rotor)
@@ -110,7 +110,7 @@ class KalmanCore:
     def _enter(self, station: Station) -> None:
         """Use the constants of a stretch of time in which the station does not change."""
         self._rotors: tuple[Cup | Propeller, ...] = rotors_of(station)
-        self._vanes: tuple[Vane, ...] = vanes_of(station)
+        self._axes: tuple[NoseAxis, ...] = axes_of(station)
         self._instruments = instruments_of(station)
         self._source.station = station
 
@@ -147,7 +147,7 @@ class KalmanCore:
         self._state_stated_slot_errors()
         row = self._source.at(np.array([first], dtype=np.int64), np.zeros(3))[0]
         start_filter(
-            self.filter, self._instruments, self._rotors, self._vanes, blocks, row,
+            self.filter, self._instruments, self._rotors, self._axes, blocks, row,
             self._settings.turbulence_intensity, self._origin,
         )  # fmt: skip
         self._started = True
@@ -167,9 +167,9 @@ class KalmanCore:
         index = [outputs // period]
         value: list[FloatArray] = [np.full(outputs.size, np.nan)]
         extra: list[FloatArray] = [np.zeros(outputs.size)]
-        for i, vane in enumerate(self._vanes):
-            part = block.readings[vane.name]
-            usable = headings(vane, part.time, part.value[:, 0], self._origin)
+        for i, axis in enumerate(self._axes):
+            part = block.readings[axis.name]
+            usable = headings(axis.instrument, part.time, part.value[:, 0], self._origin)
             times.append(usable.time)
             kinds.append(np.full(usable.time.size, READING, dtype=np.int64))
             index.append(np.full(usable.time.size, i, dtype=np.int64))
@@ -221,7 +221,9 @@ class KalmanCore:
         rotation = f.circumstances[forward.MOUNT_ROTATION : forward.MOUNT_ROTATION + 9]
         felt = rotation.reshape(3, 3).T @ (self.wind - f.circumstances[:3])
         size = float(np.hypot(felt[0], felt[1]))
-        for i in range(len(self._vanes)):
+        for i, axis in enumerate(self._axes):
+            if axis.azimuth >= 0:
+                continue
             phi = f.mean[WIND_STATES + 2 * (len(self._rotors) + i)]
             onto_nose = -(felt[0] * np.cos(phi) + felt[1] * np.sin(phi))
             if onto_nose < _TAIL_WIND * size and size > _CALM:
@@ -234,7 +236,7 @@ class KalmanCore:
         """A filter that broke down begins anew with the next blocks; it says so in its health."""
         self.restarts += 1
         self._tail_wind = 0
-        rotors, vanes = len(self._rotors), len(self._vanes)
+        rotors, vanes = len(self._rotors), len(self._axes)
         fresh = empty_filter(rotors, vanes)
         fresh.slots[:] = self.filter.slots
         fresh.height[:] = self.filter.height

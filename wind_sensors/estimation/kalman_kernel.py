@@ -79,7 +79,7 @@ def run(
         index: Vane or rotor; running number of an output.
         value: Angle of a reading or of the rotor [rad]; nan for an edge.
         extra: Additional variance of a reading [rad^2].
-        circumstances: Mount and air at the events, shape (n, 19).
+        circumstances: Mount and air at the events, shape (n, 22).
         stop: End of the last block [ns].
         block: Length of a block [ns].
         lag: Of the smoother [ns].

@@ -2,9 +2,9 @@
 
 The wind part moves linearly (`turbulence_process`), the instruments by their equations of motion
 (`forward`). Because those are not linear, the mean of a rotor's rate is corrected to second order:
-E[(A - y)(a4 A + (1 - a4) y)] differs from its value at the means by
-a4 var A + (1 - 2 a4) cov(A, y) - (1 - a4) var y. Without this the unresolved gusts would
-overspeed the estimate as they overspeed the cup.
+E[(A - y)(a4 B + (1 - a4) y)] differs from its value at the means by
+a4 cov(A, B) + (1 - a4) cov(A, y) - a4 cov(B, y) - (1 - a4) var y. Without this the unresolved
+gusts would overspeed the estimate as they overspeed the rotor.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ _GUST_TIME = 0.2
 """How long an unknown gust of the wind lasts [s]."""
 _CALM = 0.3
 """[m/s]"""
+_AT_REST = 0.02
+"""Slower rotors stand still or are about to [m/s]."""
 
 
 @compiled
@@ -85,7 +87,9 @@ def overspeeding(
     n = (wind[1] - c[1]) / size
     moved = np.empty(3)
     gradient = np.zeros(3)
+    slope_gradient = np.zeros(3)
     curvature = 0.0
+    slope_curvature = 0.0
     a_0, b_0 = 0.0, 0.0
     for k in range(-1, 3):
         along_e, along_n, along_u = 0.0, 0.0, 0.0
@@ -103,7 +107,7 @@ def overspeeding(
             + unresolved
         )
         delta = min(math.sqrt(max(variance, 1e-8)), 0.5 * size)
-        ahead = 0.0
+        ahead, slope_ahead = 0.0, 0.0
         for side in range(2):
             sign = 0.0 if k < 0 else (delta if side == 0 else -delta)
             moved[0] = wind[0] + sign * along_e
@@ -114,31 +118,37 @@ def overspeeding(
                 a_0, b_0 = a, b
                 break
             if side == 0:
-                ahead = a
+                ahead, slope_ahead = a, b
                 continue
             curvature += 0.5 * (ahead + a - 2.0 * a_0)
-            slope = (ahead - a) / (2.0 * delta)
-            gradient[0] += slope * along_e
-            gradient[1] += slope * along_n
-            gradient[2] += slope * along_u
-    forcing_variance = 0.0
+            slope_curvature += 0.5 * (slope_ahead + b - 2.0 * b_0)
+            rise = (ahead - a) / (2.0 * delta)
+            gradient[0] += rise * along_e
+            gradient[1] += rise * along_n
+            gradient[2] += rise * along_u
+            rise = (slope_ahead - b) / (2.0 * delta)
+            slope_gradient[0] += rise * along_e
+            slope_gradient[1] += rise * along_n
+            slope_gradient[2] += rise * along_u
+    both = 0.0
     with_forcing = 0.0
+    with_slope = 0.0
     for i in range(3):
         with_forcing += gradient[i] * with_rate[i]
-        forcing_variance += gradient[i] * gradient[i] * unresolved
+        with_slope += slope_gradient[i] * with_rate[i]
+        both += gradient[i] * slope_gradient[i] * unresolved
         for j in range(3):
-            forcing_variance += gradient[i] * spread[i, j] * gradient[j]
+            both += gradient[i] * spread[i, j] * slope_gradient[j]
     a4 = s.rotor[rotor, 4]
-    slope_wind = a4 * b_0 + (1.0 - a4) * y
     second = (
-        a4 * forcing_variance
-        + (1.0 - 2.0 * a4) * with_forcing
-        - (1.0 - a4) * rate_variance
-        + slope_wind * curvature
+        a4 * (both - with_slope)
+        + (1.0 - a4) * (with_forcing - rate_variance)
+        + (a4 * b_0 + (1.0 - a4) * y) * curvature
+        + a4 * (a_0 - y) * slope_curvature
     )
     density = c[AIR_DENSITY] / s.mounting[rotor, 6]
     factor = density / (s.rotor[rotor, 3] * s.rotor[rotor, 12])
-    return float(factor * second), float(2.0 * (factor * a4 * forcing_variance) ** 2)
+    return float(factor * second), float(2.0 * (factor * a4 * both) ** 2)
 
 
 @compiled
@@ -164,7 +174,7 @@ def predict(
     second_variance = np.zeros(rotors)
     with_rate = np.empty(3)
     for i in range(rotors):
-        if state[2 * i] <= 0.02:
+        if abs(state[2 * i]) <= _AT_REST:
             continue
         phi, turn = 0.0, 0.0
         if int(s.mounting[i, 0]) == ON_VANE:

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
-from wind_sensors.estimation.constants import rotors_of, vanes_of
+from wind_sensors.estimation.constants import axes_of, is_array, rotors_of
 from wind_sensors.estimation.core import Core, Estimates, joined
-from wind_sensors.estimation.health import clock_health, input_health
+from wind_sensors.estimation.health import bias_health, clock_health, input_health
 from wind_sensors.estimation.intake import (
     PLATFORM,
     PRESSURE,
@@ -82,13 +82,14 @@ class StreamingEstimator:
         settings: How to estimate.
 
     Raises:
-        UserError: The station has no rotor or no vane that the method could use.
+        UserError: The station's instruments cannot tell a wind vector.
     """
 
     def __init__(self, station: Station, settings: EstimatorSettings) -> None:
-        if not rotors_of(station) or not vanes_of(station):
+        if not is_array(station) and not (rotors_of(station) and axes_of(station)):
             raise UserError(
-                "An estimate of the wind needs a cup or propeller and a vane.",
+                "An estimate of the wind needs a cup or propeller with a vane or bivane, or fixed "
+                "propellers along different axes.",
                 "instruments",
                 "Add the missing instrument to the station file.",
             )
@@ -105,6 +106,7 @@ class StreamingEstimator:
         self._finished: list[WindowStatistics] = []
         self._unknown: dict[str, int] = {}
         self._last_health: list[HealthItem] = []
+        self._latest: WindowStatistics | None = None
 
     def _new_intake(self) -> Intake:
         s = self.settings
@@ -193,11 +195,16 @@ class StreamingEstimator:
                 core = self._core = self._new_core()
             estimates = core.process(block)
             self._keep(estimates)
-            self._finished += self._windows.take(block, estimates, core.small_scales())
+            self._close(self._windows.take(block, estimates, core.small_scales()))
 
     def _keep(self, estimates: Estimates) -> None:
         if estimates.time.size:
             self._estimates.append(estimates)
+
+    def _close(self, windows: list[WindowStatistics]) -> None:
+        if windows:
+            self._finished += windows
+            self._latest = windows[-1]
 
     def _new_core(self) -> Core:
         origin = self._intake.origin
@@ -213,7 +220,7 @@ class StreamingEstimator:
         if self._core is not None:
             estimates = self._core.finish()
             self._keep(estimates)
-            self._finished += self._windows.finish(estimates, self._core.small_scales())
+            self._close(self._windows.finish(estimates, self._core.small_scales()))
         self._last_health = self._core.health() if self._core is not None else []
         self._core = None
 
@@ -229,6 +236,8 @@ class StreamingEstimator:
         self._windows = WindowAccumulator(self.station, self.settings)
         self._estimates.clear()
         self._finished.clear()
+        self._latest = None
+        self._last_health = []
         self._unknown.clear()
 
     def take_estimates(self) -> list[WindEstimate]:
@@ -262,6 +271,8 @@ class StreamingEstimator:
         items.append(clock_health(self._intake, self._unknown))
         core = self._core
         items += core.health() if core is not None else self._last_health
+        if self._latest is not None:
+            items.append(bias_health(self._latest))
         return items
 
 
@@ -275,6 +286,6 @@ def make_estimator(
         settings: Method, rates, windows; None: the defaults.
 
     Raises:
-        UserError: The station has no rotor or no vane.
+        UserError: The station's instruments cannot tell a wind vector.
     """
     return StreamingEstimator(station, settings if settings is not None else EstimatorSettings())

@@ -1,0 +1,168 @@
+"""`wind process`: the corrected wind of a recording, with its uncertainty."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from wind_sensors.errors import UserError
+from wind_sensors.estimation import (
+    METHODS,
+    EstimatorSettings,
+    HealthLevel,
+    ProcessedRecording,
+    WindowStatistics,
+    process,
+)
+from wind_sensors.recordings import read_recording, write_recording
+from wind_sensors.recordings.writing import clear_target
+
+_TERMS = {
+    "u": "overspeeding (u)",
+    "v": "speed against vector mean (v)",
+    "w": "angular response (w)",
+    "vane_lag": "vane lag",
+    "translation": "propeller translation",
+    "arithmetic_mean": "arithmetic mean",
+}
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command's parser."""
+    defaults = EstimatorSettings()
+    parser = subparsers.add_parser(
+        "process",
+        help="signals to wind: corrected wind of a recording, with its uncertainty",
+        description="Estimate the wind from a RECORDING's pulses and vane readings, and write a "
+        "RECORDING whose bag carries the output topics (wind, wind/apparent, wind/mean, "
+        "wind/bias, ...) beside the raw ones. The same estimator runs in the live nodes and gives "
+        "the same numbers for the same messages.",
+    )
+    parser.add_argument(
+        "recording", metavar="RECORDING", help="folder with recording.yaml and bag/, or a bag"
+    )
+    parser.add_argument("--station", metavar="FILE", help="station file instead of the recording's")
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="OUT", help="folder of the new recording"
+    )
+    parser.add_argument("--force", action="store_true", help="replace OUT if it is there")
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=defaults.method,
+        help="kalman: turbulence and instruments as one stochastic model; inverse: the equations "
+        "solved for the wind; naive: the calibration alone, for comparison (default: %(default)s)",
+    )
+    for name, unit, meaning in (
+        ("window", "s", "averaging time of means, biases and direction variance"),
+        ("output-rate", "Hz", "estimates per second"),
+        ("smoother-lag", "s", "how much later data still improves an estimate; large: full"),
+        ("bandwidth", "Hz", "half-power frequency of --method inverse"),
+        ("adaptation-time", "s", "memory of the turbulence estimate"),
+    ):
+        parser.add_argument(
+            f"--{name}",
+            type=float,
+            default=getattr(defaults, name.replace("-", "_")),
+            metavar=unit,
+            help=f"{meaning} (default: %(default)g {unit})",
+        )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    settings = EstimatorSettings(
+        method=args.method,
+        window=args.window,
+        output_rate=args.output_rate,
+        smoother_lag=args.smoother_lag,
+        bandwidth=args.bandwidth,
+        adaptation_time=args.adaptation_time,
+    )
+    if Path(args.output).resolve() == Path(args.recording).resolve():
+        raise UserError(
+            "the result cannot replace the recording it comes from.",
+            args.output,
+            "Name another folder with -o.",
+        )
+    if Path(args.output).exists() and not args.force:
+        clear_target(Path(args.output), force=False)
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("estimating the wind"),
+        BarColumn(),
+        TextColumn("{task.percentage:.0f} %"),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+    ) as progress:
+        task = progress.add_task("process", total=1.0)
+        recording = read_recording(args.recording, args.station)
+        result = process(
+            recording, settings, progress=lambda done: progress.update(task, completed=done)
+        )
+    folder = write_recording(args.output, recording, outputs=result, force=args.force)
+    out = Console(file=sys.stdout, width=None if sys.stdout.isatty() else 110)
+    _report(out, result)
+    print(f"wrote {folder}")
+    return 0
+
+
+def _report(console: Console, result: ProcessedRecording) -> None:
+    for note in result.recording.notes:
+        console.print(f"note: {note}", highlight=False)
+    for item in result.health:
+        if item.level != HealthLevel.OK:
+            console.print(f"{item.level.name.lower()}: {item.name}: {item.message}")
+    if not result.windows:
+        console.print("No estimate: the recording is too short.")
+        return
+    start = result.recording.start
+    table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")
+    table.add_column("window [s]")
+    for heading in ("mean speed [m/s]", "vector mean [m/s]", "from [deg]", "turbulence u, v [m/s]",
+                    "direction spread [deg]"):  # fmt: skip
+        table.add_column(heading, justify="right")
+    for window in result.windows:
+        table.add_row(*_cells(window, start))
+    console.print(table)
+    biases = Table(title="bias of the raw mean speed [% of the mean speed]", title_justify="left")
+    biases.add_column("window [s]")
+    for text in _TERMS.values():
+        biases.add_column(text, justify="right")
+    for window in result.windows:
+        biases.add_row(
+            _span(window, start),
+            *(
+                f"{100.0 * term.value:+.2f} ± {100.0 * term.uncertainty:.2f}"
+                for term in (window.bias_terms[name] for name in _TERMS)
+            ),
+        )
+    console.print(biases)
+
+
+def _span(window: WindowStatistics, start: int) -> str:
+    return f"{(window.start - start) * 1e-9:.0f} - {(window.stop - start) * 1e-9:.0f}"
+
+
+def _cells(window: WindowStatistics, start: int) -> list[str]:
+    """Mean, direction, turbulence of one window as text with uncertainties."""
+    east, north = float(window.vector_mean[0]), float(window.vector_mean[1])
+    along = math.sqrt(max(float(window.vector_mean_covariance[0, 0]), 0.0))
+    comes_from = (270.0 - math.degrees(window.direction)) % 360.0
+    spread = math.degrees(math.sqrt(max(window.corrected_direction_variance, 0.0)))
+    return [
+        _span(window, start),
+        f"{window.scalar_mean:.3f} ± {window.scalar_mean_uncertainty:.3f}",
+        f"{math.hypot(east, north):.3f} ± {along:.3f}",
+        f"{comes_from:.1f} ± {math.degrees(window.direction_uncertainty):.1f}",
+        f"{window.turbulence[0]:.2f}, {window.turbulence[1]:.2f}",
+        f"{spread:.1f}",
+    ]
