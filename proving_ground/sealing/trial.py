@@ -24,7 +24,8 @@ RUNS = "runs"
 RUN_FILE = "run.json"
 LOG_FILE = "diagnose.log"
 DIAGNOSIS = "diagnosis.json"
-PROGRAM = (sys.executable, "-m", "wind_sensors.cli", "diagnose")
+BASELINES = "baselines"
+PROGRAM = (sys.executable, "-m", "wind_sensors.cli")
 PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "VIRTUAL_ENV", "PYTHONPATH")
 
 
@@ -56,7 +57,10 @@ def run_all(
 ) -> int:
     """Diagnose what has not been diagnosed yet; how many diagnoses failed.
 
-    options are added to the command line of the program, which is `wind diagnose`.
+    Each station's baseline is learnt once from its healthy recordings. options are added to the
+    command line of `wind diagnose`; program is what stands for `wind`.
+
+    Raises UserError if a baseline cannot be learnt.
     """
     manifest = read_manifest(folder)
     todo = [
@@ -64,13 +68,40 @@ def run_all(
         for name, entry in manifest["recordings"].items()
         if not (folder / RUNS / name / RUN_FILE).exists()
     ]
+    stations = sorted({station for _, station in todo})
+
+    def learn(station: str) -> Run | None:
+        return learn_baseline(folder, station, program)
 
     def one(item: tuple[str, str]) -> Run:
-        return run_one(folder, item[0], item[1], timeout, [*program], options)
+        return run_one(folder, item[0], item[1], timeout, program, options)
 
     with ThreadPoolExecutor(max(1, jobs)) as pool:
+        list(track(pool.map(learn, stations), "learning baselines", total=len(stations)))
         runs = list(track(pool.map(one, todo), "diagnosing", total=len(todo)))
     return sum(run.status != 0 for run in runs)
+
+
+def learn_baseline(folder: Path, station: str, program: Sequence[str] = PROGRAM) -> Run | None:
+    """Learn what is normal for a station, in a folder that holds its healthy recordings alone;
+    None where that was done before.
+
+    Raises UserError if it fails.
+    """
+    target = folder / BASELINES / f"{station}.json"
+    if target.exists():
+        return None
+    target.parent.mkdir(parents=True, exist_ok=True)
+    log = target.with_suffix(".log")
+    with tempfile.TemporaryDirectory(prefix="wind-prove-") as place:
+        room = Path(place)
+        _bring(folder / HEALTHY / station, room / "healthy")
+        healthy = sorted(str(p.relative_to(room)) for p in (room / "healthy").iterdir())
+        run = _supervise([*program, "baseline", *healthy, "-o", "baseline.json"], room, log, 900.0)
+        if run.status or not (room / "baseline.json").exists():
+            raise UserError("no baseline could be learnt", str(log), "The log says why.")
+        shutil.copy(room / "baseline.json", target)
+    return run
 
 
 def run_one(
@@ -87,10 +118,9 @@ def run_one(
     with tempfile.TemporaryDirectory(prefix="wind-prove-") as place:
         room = Path(place)
         _bring(folder / RECORDINGS / name, room / "recording")
-        _bring(folder / HEALTHY / station, room / "healthy")
-        healthy = sorted(str(p.relative_to(room)) for p in (room / "healthy").iterdir())
-        command = [*program, "recording", "--healthy", *healthy, "-o", "out", *options]
-        run = _supervise(command, room, target / LOG_FILE, timeout)
+        shutil.copy(folder / BASELINES / f"{station}.json", room / "baseline.json")
+        command = [*program, "diagnose", "recording", "--baseline", "baseline.json"]
+        run = _supervise([*command, "-o", "out", *options], room, target / LOG_FILE, timeout)
         for path in (room / "out").glob("*"):
             if path.name in (DIAGNOSIS, "report.html", "station_corrected.yaml"):
                 shutil.copy(path, target / path.name)
