@@ -261,7 +261,7 @@ def test_a_yacht_log_gives_back_the_wind_it_sailed_in(tmp_path: Path) -> None:
     assert np.allclose(velocity, 3.0 * np.exp(1j * yaw), atol=0.01), "it sails where it heads"
     assert np.allclose(np.diff(platform.position[:, 1]), 1852.0 * 0.001, rtol=0.01)
     vane = recording.angles["vane"]
-    speed = read_series(tmp_path / "recording", "/wind/speed")
+    speed = read_series(tmp_path / "recording", "/masthead/speed")
     assert np.array_equal(speed.time, vane.time)
     steady = np.asarray([0, 1, 2, 3, 4, 5, 6, 10, 11, 12, 13, 14, 15, 16, 20, 21, 22, 23, 24, 25])
     for time, angle, magnitude in zip(vane.time, vane.angle, speed.value, strict=True):

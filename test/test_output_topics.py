@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from rosbags.rosbag2 import Reader
 
+from wind_sensors.errors import UserError
 from wind_sensors.estimation.outputs import (
     BiasTerm,
     HealthItem,
@@ -17,6 +19,7 @@ from wind_sensors.estimation.outputs import (
 from wind_sensors.recordings import read_recording, read_series, write_recording
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.reading import read_estimates
+from wind_sensors.recordings.serialising import TopicMessages
 from wind_sensors.station.model import Cup, Input, Station
 from wind_sensors.station.signals import Pulses, Recording
 
@@ -58,6 +61,14 @@ def window(start: int, mean: float) -> WindowStatistics:
         bias_terms={"u": BiasTerm(0.01, 0.001)},
         instrument="cup",
     )
+
+
+def test_an_input_topic_among_the_outputs_is_refused(tmp_path: Path) -> None:
+    recording = small_recording()
+    taken = TopicMessages("/cup/pulses", "std_msgs/msg/Header", np.asarray([START]), [b"\0" * 20])
+    with pytest.raises(UserError, match="/cup/pulses"):
+        write_recording(tmp_path / "r", recording, outputs=[taken])
+    assert not (tmp_path / "r").exists()
 
 
 def test_estimates_become_the_documented_output_topics(tmp_path: Path) -> None:

@@ -14,7 +14,11 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
 from wind_sensors.recordings.mapping import mapping_markdown
 from wind_sensors.recordings.reading import open_recording, signals_of
-from wind_sensors.recordings.station_files import load_station, shipped_profiles
+from wind_sensors.recordings.station_files import (
+    configuration_folder,
+    load_station,
+    shipped_profiles,
+)
 from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station, Vane
 from wind_sensors.station.reference import schema_markdown
 from wind_sensors.station.signals import Recording, TimeArray
@@ -56,6 +60,13 @@ def run(options: argparse.Namespace) -> int:
             "no recording is named.", "", "Give a recording, a station file, or --profiles."
         )
     path = Path(options.path)
+    shipped = {file.stem for file in configuration_folder().glob("*.yaml")}
+    if not path.exists() and options.path not in shipped:
+        raise UserError(
+            "there is no such recording or station file.",
+            options.path,
+            f"Configurations that ship: {', '.join(sorted(shipped))}.",
+        )
     if path.suffix in {".yaml", ".yml"} or not path.exists():
         _print_station(console, load_station(path))
         return 0

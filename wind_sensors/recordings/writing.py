@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,6 +63,14 @@ def write_topics(
     Raises:
         UserError: Something is there already, or the folder cannot be written.
     """
+    names = Counter(topic.topic for topic in topics)
+    twice = [name for name, count in names.items() if count > 1]
+    if twice:
+        raise UserError(
+            f"two kinds of messages go to {', '.join(twice)}.",
+            str(folder),
+            "Choose input topics in the station file that are not among the outputs (wind/...).",
+        )
     target = Path(folder)
     clear_target(target, force=force)
     partial = target.with_name(f".{target.name}.partial")
