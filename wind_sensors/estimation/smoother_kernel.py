@@ -262,7 +262,8 @@ def smooth(
         _swap(out_time, out_states, out_covariance, out_circumstances, low, high)
         low += 1
         high -= 1
-    f.clock[1] = until
+    # A block without events is smoothed again with the next one: nothing is delivered twice.
+    f.clock[1] = max(f.clock[1], until)
     f.clock[3] += 1
     _follow(f, rotors, weight, score, expected, noise_score, noise_expected)
     return filled
