@@ -11,6 +11,7 @@ from scipy.stats import beta
 from proving_ground.scoring.outcome import NAMES_SOMETHING, Judged
 
 LARGE = 3.0
+SINGLE = ("single", "onset", "large")
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def _pair(judged: Judged) -> bool:
 
 
 def _single(judged: Judged) -> bool:
-    return judged.stratum in ("single", "onset") and judged.size >= LARGE
+    return judged.stratum in SINGLE and judged.size >= LARGE
 
 
 def promised_rates(judged: Sequence[Judged]) -> list[Rate]:

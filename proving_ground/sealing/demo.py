@@ -40,7 +40,7 @@ def play(folder: Path, seed: int, *, force: bool = False) -> None:
         minutes=MINUTES,
         healthy_count=HEALTHY_COUNT,
         kinds="A",
-        strata={"onset": 1},
+        strata={"large": 1},
     )
     say(f"   commitment {sealed.commitment}")
     name = next((folder / RECORDINGS).iterdir()).name

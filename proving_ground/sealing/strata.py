@@ -171,6 +171,8 @@ def _planted(
     names = applicable(station.kind, station.pulses_per_revolution)
     if stratum == "unknown":
         return (Planted(next(strangers), float(rng.choice([2.0, 3.0, 5.0]))),)
+    if stratum == "large":
+        return (Planted(str(rng.choice(names)), 4.0),)
     if stratum == "pair":
         pair = rng.permutation(names)[:2]
         return tuple(Planted(str(n), 3.0) for n in pair)
