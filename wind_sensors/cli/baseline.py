@@ -79,7 +79,9 @@ def read_baseline(path: Path) -> Baseline:
         ) from None
     except ValueError:
         raise UserError(
-            "this is not a baseline.", str(path), "Make one with `wind baseline HEALTHY... -o FILE`."
+            "this is not a baseline.",
+            str(path),
+            "Make one with `wind baseline HEALTHY... -o FILE`.",
         ) from None
 
 

@@ -65,18 +65,17 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         )
     shortest = float(np.quantile(interval, 0.001))
     if np.mean(usual < 0.97 * shortest) > 0.004:
-        for share in (1.0, 0.9):
-            out.append(
-                _term(
-                    "missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0
-                )
-            )
+        out.extend(
+            _term("missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0)
+            for share in (1.0, 0.9)
+        )
     if short > 0.004:
         delay = float(np.median(interval[relative < 0.4]))
         out.append(
             _term(
                 "extra_pulses", rotor.name,
-                bounce_probability=min(2.0 * short, 0.9), bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
+                bounce_probability=min(2.0 * short, 0.9),
+                bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
             )
         )  # fmt: skip
     scatter = comparison.measured.statistics[f"{rotor.name}/rotor_rate"][BANDS + 2]
@@ -141,10 +140,10 @@ def _reading_guesses(comparison: Comparison, vane: Angle) -> list[Term]:
     if 1 <= common.size <= 3:
         low, high = float(common.min()), float(common.max())
         if common.size == 1:
-            for side in (-1.0, 1.0):
-                out.append(
-                    _term("potentiometer_gap", vane.name, centre=low + 5.0 * side, width=10.0)
-                )
+            out.extend(
+                _term("potentiometer_gap", vane.name, centre=low + 5.0 * side, width=10.0)
+                for side in (-1.0, 1.0)
+            )
         else:
             width = high - low
             centre = 0.5 * (low + high)

@@ -34,7 +34,13 @@ FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
 WINDOW_CANDIDATES = 4
 WINDOW_ADVANTAGE = 12.0
+LEAST_WINDOW_GAIN = 4.0
 FINALISTS = 5
+FAR_BEHIND = 0.6
+"""Fits that miss more than this share of the leader's gain do not compete with it."""
+
+WORTH_ANOTHER_TURN = 14.0
+"""Largest linear score below which no further effect is looked for."""
 
 
 def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
@@ -124,7 +130,7 @@ def _window_starts(
     found: list[tuple[float, list[Term]]] = []
     for score in scores[: 2 * WINDOW_CANDIDATES]:
         key = (score.effect, score.instrument)
-        if key in used or score.effect == "stuck_sensor":
+        if key in used or score.effect == "stuck_sensor" or score.gain < LEAST_WINDOW_GAIN:
             continue
         members = groups[key]
         strong = sorted(
@@ -212,6 +218,13 @@ def name(
             if starts[0].key not in used
         ]
         windowed = _window_starts(searcher, whitener, current.vector, used)
+        if not first and not windowed:
+            scores = screen(
+                searcher.bank.templates, searcher.white_signatures(whitener), current.vector
+            )
+            if all(s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument)
+                   not in used):
+                break
         fits = searcher.fit_all(whitener, fixed, [*candidates, *windowed])
         fits = sorted((f for f in fits if _plausible(f)), key=_total)
         needed = ACCEPTED_GAIN if first else ACCEPTED_FURTHER_GAIN
@@ -225,7 +238,9 @@ def name(
         for _ in range(2):
             leader = (refitted or fits)[0]
             whitener = searcher.whitener(leader.simulated)
-            pool = (refitted or fits)[:FINALISTS]
+            best = _total(leader)
+            reach = FAR_BEHIND * (_total(current) - best)
+            pool = [f for f in (refitted or fits)[:FINALISTS] if _total(f) - best <= reach]
             null = whitener
             refitted = searcher.refit_all(null, [f.terms for f in pool])
             refitted = [

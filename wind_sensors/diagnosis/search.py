@@ -29,6 +29,10 @@ from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 
+LEAST_GAIN = 6.0
+LEAST_SHARE = 0.03
+"""Effects whose linear score stays below this, or below this share of the best, are not fitted."""
+
 PENALTY_PER_PARAMETER = 3.0
 """Cost of one more parameter, in units of the squared white vector."""
 
@@ -89,7 +93,8 @@ class Searcher:
         scores = screen(self.bank.templates, signatures, vector)
         groups = group_templates(self.bank.templates)
         out: list[list[Term]] = []
-        for score in scores[:number]:
+        worth = max(LEAST_GAIN, LEAST_SHARE * scores[0].gain) if scores else 0.0
+        for score in [s for s in scores[:number] if s.gain > worth]:
             effect = self.effects[score.effect]
             start = starting_values(score)
             starts = [Term(effect, score.instrument, start)]

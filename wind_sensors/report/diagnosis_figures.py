@@ -7,11 +7,12 @@ import itertools
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.observation import Channel
-from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report import style
 
 FloatArray = npt.NDArray[np.float64]
@@ -29,12 +30,13 @@ def as_svg(made: Figure) -> str:
     return content[content.index("<svg") :]
 
 
-def _series(diagnosis: Diagnosis, channel: Channel) -> tuple[FloatArray, FloatArray, str]:
+def _series(
+    comparison: Comparison, simulated: Simulated, corrected: Simulated | None, channel: Channel
+) -> tuple[FloatArray, FloatArray, str]:
     """Residuals before and after, and their unit."""
-    comparison = diagnosis.comparison
     measured = comparison.measured.series[channel.name]
-    before = measured - diagnosis.simulated.series[channel.name]
-    after = measured - diagnosis.corrected.series[channel.name]
+    before = measured - simulated.series[channel.name]
+    after = measured - (corrected or simulated).series[channel.name]
     if channel.kind == "vane_angle":
         return np.degrees(before / comparison.speed), np.degrees(after / comparison.speed), "deg"
     return before, after, "m/s"
@@ -60,11 +62,18 @@ def _binned(
     return np.array(middles), np.array(means), np.array(errors)
 
 
-def residual_figure(diagnosis: Diagnosis, channel: Channel) -> Figure:
-    """Residual of a channel over time, direction, speed and frequency, before and after."""
-    comparison = diagnosis.comparison
-    before, after, unit = _series(diagnosis, channel)
-    corrected = diagnosis.corrected is not diagnosis.simulated
+def residual_figure(
+    comparison: Comparison, simulated: Simulated, corrected: Simulated | None, channel: Channel
+) -> Figure:
+    """Residual of a channel over time, direction, speed and frequency, before and after.
+
+    Args:
+        comparison: The recording.
+        simulated: Simulation of the station as it is described.
+        corrected: With the named physics; None: nothing is named.
+        channel: What is shown.
+    """
+    before, after, unit = _series(comparison, simulated, corrected, channel)
     width = max(int(_SMOOTHING / comparison.grid.dt), 1)
     at = comparison.grid.centres
     on_platform = comparison.drive.motion is not None
@@ -79,7 +88,7 @@ def residual_figure(diagnosis: Diagnosis, channel: Channel) -> Figure:
         by_frequency = made.add_subplot(grid[1, 2])
         cut = at[width - 1 :] - 0.5 * (width - 1) * comparison.grid.dt
         over_time.plot(cut, _smooth(before, width), color=style.RAW, label="before")
-        if corrected:
+        if corrected is not None:
             over_time.plot(cut, _smooth(after, width), color=style.CORRECTED, label="with it")
             over_time.legend(loc="upper right", ncols=2)
         over_time.axhline(0.0, color=style.MUTED, linewidth=0.8)
@@ -93,7 +102,7 @@ def residual_figure(diagnosis: Diagnosis, channel: Channel) -> Figure:
             (by_speed, comparison.speed, speeds, "wind speed in m/s"),
         ):  # fmt: skip
             pairs = [(before, style.RAW)]
-            if corrected:
+            if corrected is not None:
                 pairs.append((after, style.CORRECTED))
             for values, colour in pairs:
                 x, y, e = _binned(of, values, edges)
@@ -101,24 +110,27 @@ def residual_figure(diagnosis: Diagnosis, channel: Channel) -> Figure:
             axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
             axes.set_xlabel(label)
         by_direction.set_ylabel(unit)
-        _spectra(diagnosis, channel, by_frequency, corrected=corrected)
+        _spectra(comparison, simulated, corrected, channel, by_frequency)
     return made
 
 
-def _spectra(diagnosis: Diagnosis, channel: Channel, axes: object, *, corrected: bool) -> None:
-    from matplotlib.axes import Axes
-
-    assert isinstance(axes, Axes)
-    comparison = diagnosis.comparison
+def _spectra(
+    comparison: Comparison,
+    simulated: Simulated,
+    corrected: Simulated | None,
+    channel: Channel,
+    axes: Axes,
+) -> None:
+    """Ratio of recorded to simulated power."""
     measured = comparison.measured.cosine[channel.name]
     edges = spectra.band_edges(measured.size)
     frequency = 0.5 * (edges[:-1] + edges[1:]) / (2.0 * comparison.grid.n * comparison.grid.dt)
     power = spectra.band_means(measured**2, edges)
-    pairs = [(diagnosis.simulated, style.RAW)]
-    if corrected:
-        pairs.append((diagnosis.corrected, style.CORRECTED))
-    for simulated, colour in pairs:
-        other = spectra.band_means(simulated.cosine[channel.name] ** 2, edges)
+    pairs = [(simulated, style.RAW)]
+    if corrected is not None:
+        pairs.append((corrected, style.CORRECTED))
+    for expected, colour in pairs:
+        other = spectra.band_means(expected.cosine[channel.name] ** 2, edges)
         axes.semilogx(frequency, power / np.maximum(other, 1e-12), "o-", color=colour, ms=3.0)
     axes.axhline(1.0, color=style.MUTED, linewidth=0.8)
     axes.set_ylim(0.0, 3.0)

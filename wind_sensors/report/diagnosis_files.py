@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.verdict import Diagnosis, as_json
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore
@@ -22,15 +24,15 @@ NUMBER = "std_msgs/msg/Float64"
 NAMES = ("diagnosis.json", "report.html", "station_corrected.yaml", "residuals")
 
 
-def make_way(folder: Path, *, force: bool) -> None:
-    """Clear a folder of an earlier diagnosis.
+def make_way(folder: Path, names: Sequence[str] = NAMES, *, force: bool) -> None:
+    """Clear a folder of what a command wrote before.
 
     Raises:
-        UserError: Something is there and `force` is not given, or it is not a diagnosis.
+        UserError: Something is there and `force` is not given, or it is not a folder.
     """
     if folder.exists() and not folder.is_dir():
         raise UserError("this is no folder.", str(folder), "Choose another place with -o.")
-    taken = [folder / name for name in NAMES if (folder / name).exists()]
+    taken = [folder / name for name in names if (folder / name).exists()]
     if taken and not force:
         raise UserError(
             "this exists already.", str(taken[0]), "Choose another place with -o, or add --force."
@@ -42,30 +44,31 @@ def make_way(folder: Path, *, force: bool) -> None:
             path.unlink()
 
 
-def residual_topics(diagnosis: Diagnosis) -> list[TopicMessages]:
-    """Measured, simulated and corrected series of each channel, and what is left of them.
+def series_topics(
+    comparison: Comparison, series: Mapping[str, Simulated]
+) -> list[TopicMessages]:
+    """Series of each channel and what is left of the measured one after each simulated one.
 
     Rotor rates in m/s of wind, vane angles in degrees, every bin at its middle.
+
+    Args:
+        comparison: The recording.
+        series: `measured` and one or more simulations, by name.
     """
     types = typestore()
     blank = template(types, NUMBER, [("data",)])
-    comparison = diagnosis.comparison
     time = comparison.grid.start + np.rint(comparison.grid.centres * 1e9).astype(np.int64)
     out = []
     for channel in comparison.channels:
-        series = {
-            "measured": comparison.measured.series[channel.name],
-            "simulated": diagnosis.simulated.series[channel.name],
-            "corrected": diagnosis.corrected.series[channel.name],
-        }
+        columns = {name: of.series[channel.name] for name, of in series.items()}
         if channel.kind == "vane_angle":
-            series = {
+            columns = {
                 name: np.degrees(values / comparison.speed + comparison.direction)
-                for name, values in series.items()
+                for name, values in columns.items()
             }
-        series["residual_before"] = series["measured"] - series["simulated"]
-        series["residual_after"] = series["measured"] - series["corrected"]
-        for name, values in series.items():
+        for name in [n for n in columns if n != "measured"]:
+            columns[f"measured_minus_{name}"] = columns["measured"] - columns[name]
+        for name, values in columns.items():
             raw = serialised(types, blank, {("data",): values})
             out.append(TopicMessages(f"/{channel.name}/{name}", NUMBER, time, raw))
     return out
@@ -84,5 +87,13 @@ def write(folder: Path, diagnosis: Diagnosis) -> list[Path]:
     )
     (folder / "report.html").write_text(page(diagnosis), encoding="utf-8")
     (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
-    write_topics(folder / "residuals", station_text, residual_topics(diagnosis))
+    topics = series_topics(
+        diagnosis.comparison,
+        {
+            "measured": diagnosis.comparison.measured,
+            "simulated": diagnosis.simulated,
+            "corrected": diagnosis.corrected,
+        },
+    )
+    write_topics(folder / "residuals", station_text, topics)
     return [folder / name for name in NAMES]

@@ -193,13 +193,15 @@ def _detectable(diagnosis: Diagnosis) -> str:
 
 def page(diagnosis: Diagnosis) -> str:
     """The report as one HTML file without outside references."""
-    figures = []
     wanted = {f.located.region.channel for f in diagnosis.findings} or {
         f.region.channel for f in diagnosis.unexplained.regions[:1]
     }
-    for channel in diagnosis.comparison.channels:
-        if channel.name in wanted:
-            figures.append(as_svg(residual_figure(diagnosis, channel)))
+    corrected = diagnosis.corrected if diagnosis.findings else None
+    figures = [
+        as_svg(residual_figure(diagnosis.comparison, diagnosis.simulated, corrected, channel))
+        for channel in diagnosis.comparison.channels
+        if channel.name in wanted
+    ]
     healthy = ", ".join(diagnosis.baseline.recordings) or "none"
     body = [
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
@@ -217,9 +219,14 @@ def page(diagnosis: Diagnosis) -> str:
         _detectable(diagnosis),
         f"<p class='muted'>Healthy recordings behind the baseline: {escape(healthy)}.</p>",
     ]
+    return document(f"Diagnosis of {diagnosis.recording}", "".join(body))
+
+
+def document(title: str, body: str) -> str:
+    """A page in the house's style."""
     return (
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<title>Diagnosis of {escape(diagnosis.recording)}</title><style>{_STYLE}</style></head>"
-        f"<body><main>{''.join(body)}</main></body></html>\n"
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>"
+        f"<body><main>{body}</main></body></html>\n"
     )

@@ -1,0 +1,114 @@
+"""What `wind compare` leaves on disk."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.regions import Found
+from wind_sensors.recordings.serialising import TopicMessages
+from wind_sensors.recordings.station_files import shipped_profiles
+from wind_sensors.recordings.writing import write_topics
+from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
+from wind_sensors.report.diagnosis_files import series_topics
+from wind_sensors.report.diagnosis_page import document
+from wind_sensors.station.writing import station_to_yaml
+
+NAMES = ("comparison.json", "comparison.html", "residuals")
+
+
+def channel_summary(comparison: Comparison, simulated: Simulated) -> list[dict[str, Any]]:
+    """Mean, scatter and coherence of each channel's recorded minus simulated series."""
+    out = []
+    for channel in comparison.channels:
+        residual = (
+            comparison.measured.series[channel.name] - simulated.series[channel.name]
+        )
+        unit = "m/s"
+        if channel.kind == "vane_angle":
+            residual, unit = np.degrees(residual / comparison.speed), "deg"
+        coherence = comparison.coherence(simulated, channel)
+        edges = coherence.edges
+        residual_power = spectra.band_means(
+            (comparison.measured.cosine[channel.name] - simulated.cosine[channel.name]) ** 2, edges
+        )
+        out.append(
+            {
+                "channel": channel.name,
+                "unit": unit,
+                "mean": float(np.mean(residual)),
+                "rms": float(np.sqrt(np.mean(residual**2))),
+                "frequency_hz": coherence.frequency.tolist(),
+                "squared_coherence": coherence.squared.tolist(),
+                "recorded_over_simulated_power": (
+                    coherence.measured / np.maximum(coherence.simulated, 1e-12)
+                ).tolist(),
+                "residual_power": residual_power.tolist(),
+            }
+        )
+    return out
+
+
+def write(
+    folder: Path, comparison: Comparison, simulated: Simulated, found: list[Found], p: float
+) -> list[Path]:
+    """Write the comparison.
+
+    Args:
+        folder: Where to.
+        comparison: The recording.
+        simulated: Simulation of the station.
+        found: Regions where the residual stands out most.
+        p: Probability of the largest on a healthy day.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    summary = channel_summary(comparison, simulated)
+    regions = [
+        {
+            "channel": f.region.channel, "kind": f.region.kind, "where": f.region.label,
+            "low": f.region.low, "high": f.region.high,
+            "residual": f.excess, "unit": f.unit, "score": f.score,
+        }
+        for f in found
+    ]  # fmt: skip
+    content = {"recording": comparison.recording.name, "channels": summary,
+               "regions": regions, "p": p}  # fmt: skip
+    (folder / "comparison.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    rows = "".join(
+        f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
+        f"<td class='n'>{f.excess:.3g} {escape(f.unit)}</td><td class='n'>{f.score:.1f}</td></tr>"
+        for f in found
+    )
+    means = "".join(
+        f"<tr><td>{escape(c['channel'])}</td><td class='n'>{c['mean']:.3g} {c['unit']}</td>"
+        f"<td class='n'>{c['rms']:.3g} {c['unit']}</td></tr>"
+        for c in summary
+    )
+    figures = "".join(
+        as_svg(residual_figure(comparison, simulated, None, channel))
+        for channel in comparison.channels
+    )
+    body = (
+        f"<header><div class='muted'>{escape(comparison.recording.name)} · wind compare</div>"
+        "<h1>Recorded minus simulated</h1><div class='scroll'><table><tr><th>channel</th>"
+        f"<th>mean</th><th>rms</th></tr>{means}</table></div></header>"
+        f"<section>{figures}</section><section><h2>Where it stands out</h2>"
+        f"<p>p = {p:.3g} for the largest, after looking everywhere.</p><div class='scroll'>"
+        "<table><tr><th>channel</th><th>where</th><th>residual</th><th>score</th></tr>"
+        f"{rows}</table></div></section>"
+    )
+    (folder / "comparison.html").write_text(
+        document(f"Comparison of {comparison.recording.name}", body), encoding="utf-8"
+    )
+    topics: list[TopicMessages] = series_topics(
+        comparison, {"measured": comparison.measured, "simulated": simulated}
+    )
+    station = station_to_yaml(comparison.recording.station, shipped_profiles())
+    write_topics(folder / "residuals", station, topics)
+    return [folder / name for name in NAMES]
