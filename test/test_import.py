@@ -18,6 +18,7 @@ from wind_sensors.recordings import nmea, read_recording, read_series
 from wind_sensors.recordings.importing import Imported, import_files, write_imported
 from wind_sensors.recordings.mapping import UNITS, read_mapping
 from wind_sensors.recordings.station_files import configuration_folder
+from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Recording
 
 REAL = Path(__file__).parent.parent.parent / "shared" / "real"
@@ -144,9 +145,10 @@ def test_means_keep_their_averaging_time_and_get_the_end_of_their_interval(tmp_p
     assert deviation.value.tolist() == [8.0, 8.0]
     assert np.allclose(np.degrees(recording.angles["vane_78"].angle), 82.0)
     cup = recording.station.instrument("cup_80_north")
+    assert isinstance(cup, Cup)
     turns = recording.pulses["cup_80_north"].turns
     assert turns is not None
-    run = turns[-1] * 2.0 * np.pi * cup.calibration_distance  # type: ignore[union-attr]
+    run = turns[-1] * 2.0 * np.pi * cup.calibration_distance
     assert run / 600.0 + 0.35 == pytest.approx(8.0)
 
 

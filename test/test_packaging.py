@@ -5,9 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -28,11 +26,11 @@ def declaration(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 @pytest.fixture
-def bootstrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+def bootstrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The script, with its commands recorded instead of run."""
     spec = importlib.util.spec_from_file_location("bootstrap", ROOT / "scripts" / "bootstrap.py")
     assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    module: Any = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     monkeypatch.setattr(module, "VENV", tmp_path / ".venv")
     monkeypatch.setattr(module, "STAMP", tmp_path / ".venv" / "stamp")
@@ -44,8 +42,8 @@ def bootstrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Modul
         (tmp_path / ".venv" / "bin" / "python").touch()
 
     monkeypatch.setattr(module, "run", run)
-    module.commands = commands  # type: ignore[attr-defined]
-    yield module
+    module.commands = commands
+    return module
 
 
 def test_every_executable_is_declared_once_and_named_after_its_module(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,8 +58,8 @@ def vane(joint_states: Input) -> Vane:
     return Vane(name="vane", joint_states=joint_states, distance_constant=0.5, damping_ratio=0.4)
 
 
-def recorded(station: Station, **signals: object) -> Recording:
-    return Recording("test", station, START, START + 10_000_000_000, **signals)  # type: ignore[arg-type]
+def recorded(station: Station, **signals: Any) -> Recording:
+    return Recording("test", station, START, START + 10_000_000_000, **signals)
 
 
 def full_recording(rng: np.random.Generator) -> Recording:
