@@ -11,7 +11,7 @@ from wind_sensors.instruments.dynamics.rotor import table_at
 from wind_sensors.instruments.propeller_vane import inertial_delta
 from wind_sensors.instruments.speed_bias import inertial_bias
 from wind_sensors.instruments.vane_variance import inertial_loss
-from wind_sensors.station.model import Cup, Propeller, Vane
+from wind_sensors.station.model import Angle, Cup, Propeller
 from wind_sensors.station.parameters import rotor_parameters
 from wind_sensors.turbulence.inertial_range import (
     KOLMOGOROV_CONSTANT,
@@ -60,7 +60,7 @@ def response_curvature(rotor: Cup | Propeller) -> float:
     return 2.0 * (response - math.cos(theta)) / theta**2
 
 
-def vane_loss(vane: Vane, turbulence: WindowTurbulence) -> float:
+def vane_loss(vane: Angle, turbulence: WindowTurbulence) -> float:
     """<v^2> - U^2 <phi^2> [m^2/s^2] that the vane does not show; K94 (54)."""
     across = dissipation(0.75 * turbulence.small_scales.across, turbulence.speed)
     return inertial_loss(
@@ -68,7 +68,7 @@ def vane_loss(vane: Vane, turbulence: WindowTurbulence) -> float:
     )
 
 
-def _translation(rotor: Propeller, vane: Vane, mu2: float, eps: float, speed: float) -> float:
+def _translation(rotor: Propeller, vane: Angle, mu2: float, eps: float, speed: float) -> float:
     """Part of the propeller-vane's bias that its distance from the axis makes; K94 (110)."""
     arm = rotor.distance_to_vane_axis / vane.distance_constant
     alpha_1 = one_sided_longitudinal_constant()
@@ -82,12 +82,16 @@ def _translation(rotor: Propeller, vane: Vane, mu2: float, eps: float, speed: fl
 
 
 def predicted_terms(
-    rotor: Cup | Propeller, vane: Vane, turbulence: WindowTurbulence, arithmetic_mean: float
+    rotor: Cup | Propeller,
+    vane: Angle | None,
+    turbulence: WindowTurbulence,
+    arithmetic_mean: float,
 ) -> dict[str, BiasTerm]:
     """Terms relative to the mean speed.
 
     Args:
-        rotor, vane: The instruments.
+        rotor: The rotor.
+        vane: What tells the direction; None for an array, whose only closed term is v.
         turbulence: Of the window.
         arithmetic_mean: Excess of the mean over revolutions over the mean over time [1], exact;
             K94 (28).
@@ -97,6 +101,10 @@ def predicted_terms(
         vane does not follow), translation (the propeller moves with the vane), arithmetic_mean.
     """
     speed = max(turbulence.speed, 0.1)
+    vector = max(turbulence.vector_speed, 0.1)
+    v_term = turbulence.speed / vector - 1.0
+    if vane is None:
+        return {"v": BiasTerm(v_term, 0.05 * abs(v_term))}
     mu2 = response_curvature(rotor)
     eps = dissipation(turbulence.small_scales.along, speed)
     local = inertial_bias(
@@ -113,8 +121,6 @@ def predicted_terms(
         translation = _translation(rotor, vane, mu2, across, speed)
     else:
         lag = 0.5 * vane_loss(vane, turbulence) / speed**2
-    vector = max(turbulence.vector_speed, 0.1)
-    v_term = turbulence.speed / vector - 1.0
     return {
         "u": BiasTerm(local.u, _LEVEL_UNCERTAINTY * abs(local.u)),
         "v": BiasTerm(v_term, 0.05 * abs(v_term)),

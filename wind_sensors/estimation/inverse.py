@@ -16,8 +16,14 @@ import numpy.typing as npt
 from wind_sensors.compiled import compiled
 from wind_sensors.estimation.circumstances import CircumstanceSource
 from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
-from wind_sensors.estimation.forward import AIR_DENSITY, AIR_TEMPERATURE, MOUNT_YAW_RATE
-from wind_sensors.estimation.history import History
+from wind_sensors.estimation.forward import (
+    AIR_DENSITY,
+    AIR_TEMPERATURE,
+    MOUNT_PITCH_RATE,
+    MOUNT_ROLL_RATE,
+    MOUNT_YAW_RATE,
+)
+from wind_sensors.estimation.history import History, NoseTrack
 from wind_sensors.estimation.intake import Block
 from wind_sensors.estimation.naive import earth_estimates
 from wind_sensors.estimation.outputs import HealthItem
@@ -201,7 +207,7 @@ class InverseCore:
 
     def _until(self, stop: int) -> Estimates:
         h = self._history
-        if stop <= self._next or h.vane_time.size < 3 or h.edge_time.size < 3:
+        if stop <= self._next or h.nose.time.size < 3 or h.edges.time.size < 3:
             return no_estimates()
         times = output_times(self._next, stop, self._settings.output_rate)
         self._next = stop
@@ -215,7 +221,7 @@ class InverseCore:
         for k in range(n):
             row = rows[k]
             turned = self._rotor_motion(int(times[k]))
-            nose = local_parabola(h.vane_time, h.heading, int(times[k]), self._width)
+            nose = local_parabola(h.nose.time, h.nose.angle, int(times[k]), self._width)
             y = max(turned[1] * self._rotor.calibration_distance, 0.0)
             y_rate = turned[2] * self._rotor.calibration_distance
             density = row[AIR_DENSITY] / h.rotor.reference_density
@@ -232,21 +238,45 @@ class InverseCore:
             noise = turned[4] * (self._rotor.calibration_distance * slot * _EDGE_DEVIATION) ** 2
             along[k] = noise + level * missing
             across[k] = nose[3] * (speed[k] * _READING_DEVIATION) ** 2 + 4 / 3 * level * missing
-        vertical = np.full(n, level * 3.0)
-        estimates = earth_estimates(times, speed, heading, along, across, vertical, rows)
+        lift, vertical = None, np.full(n, level * 3.0)
+        if h.elevation is not None and h.elevation.time.size >= 3:
+            lift, vertical = self._lift(h.elevation, times, rows, speed, heading), across
+        estimates = earth_estimates(times, speed, heading, along, across, vertical, rows, lift)
         self._follow(estimates.velocity)
         return estimates
 
+    def _lift(
+        self,
+        elevation: NoseTrack,
+        times: TimeArray,
+        rows: FloatArray,
+        speed: FloatArray,
+        heading: FloatArray,
+    ) -> FloatArray:
+        """Vertical wind [m/s] from the elevation of a bivane, shape (n,)."""
+        out = np.empty(times.size)
+        for k in range(times.size):
+            row = rows[k]
+            lift = local_parabola(elevation.time, elevation.angle, int(times[k]), self._width)
+            pitching = row[MOUNT_PITCH_RATE] * math.cos(heading[k])
+            pitching -= row[MOUNT_ROLL_RATE] * math.sin(heading[k])
+            rises = wind_heading_from_motion(
+                self._vane, lift[0], lift[1], lift[2], speed[k] / math.cos(lift[0]), pitching,
+                row[AIR_DENSITY] / self._history.vane.reference_density,
+            )  # fmt: skip
+            out[k] = speed[k] * math.tan(rises)
+        return out
+
     def _rotor_motion(self, time: int) -> tuple[float, float, float, float, float]:
         """Angle, rate and acceleration of the rotor; one that has stopped does not move."""
-        edges = self._history.edge_time
+        edges = self._history.edges.time
         stop_ns = self._settings.stop_time * 1e9
         after = int(np.searchsorted(edges, time))
         since = time - edges[after - 1] if after > 0 else 0
         until = edges[after] - time if after < edges.size else self._stop - time
         if since + until > stop_ns:
             return 0.0, 0.0, 0.0, 1.0, 1.0
-        return local_parabola(edges, self._history.edge_angle, time, self._width)
+        return local_parabola(edges, self._history.edges.angle, time, self._width)
 
     def _follow(self, velocity: FloatArray) -> None:
         """Running structure function at one period of the bandwidth."""

@@ -29,29 +29,6 @@ def calibrated_speed(rotor: Cup | Propeller, y: FloatArray) -> FloatArray:
     return np.where(y > 0.0, y + offset, 0.0)
 
 
-def naive_signals(history: History, times: TimeArray) -> tuple[FloatArray, FloatArray]:
-    """Speed from the latest interval between edges [m/s] and latest heading [rad], shape (n,).
-
-    Silence longer than the latest interval lowers the speed to what the silence allows.
-    """
-    edges, angle = history.edge_time, history.edge_angle
-    length = history.rotor.calibration_distance
-    if edges.size >= 2:
-        last = np.clip(np.searchsorted(edges, times, side="right") - 1, 1, edges.size - 1)
-        dt = (edges[last] - edges[last - 1]) * 1e-9
-        turned = angle[last] - angle[last - 1]
-        silent = np.maximum(dt, (times - edges[last]) * 1e-9)
-        y = length * turned / silent
-    else:
-        y = np.zeros(times.size)
-    if history.vane_time.size:
-        at = np.maximum(np.searchsorted(history.vane_time, times, side="right") - 1, 0)
-        heading = history.heading[at]
-    else:
-        heading = np.zeros(times.size)
-    return calibrated_speed(history.rotor, y), heading
-
-
 def earth_estimates(
     times: TimeArray,
     speed: FloatArray,
@@ -60,6 +37,7 @@ def earth_estimates(
     across_variance: FloatArray,
     vertical_variance: FloatArray,
     rows: FloatArray,
+    vertical: FloatArray | None = None,
 ) -> Estimates:
     """Estimates from speed and nose heading in the sensor frame.
 
@@ -69,9 +47,11 @@ def earth_estimates(
         heading: Where the wind comes from, counter-clockwise from x [rad], shape (n,).
         along_variance, across_variance, vertical_variance: [m^2/s^2], shape (n,).
         rows: Circumstances, shape (n, 22).
+        vertical: Along the vane's axis [m/s], shape (n,); None: not known, taken as zero.
     """
     c, s = -np.cos(heading), -np.sin(heading)
-    apparent = np.stack((speed * c, speed * s, np.zeros_like(speed)), axis=1)
+    upwards = np.zeros_like(speed) if vertical is None else vertical
+    apparent = np.stack((speed * c, speed * s, upwards), axis=1)
     frame = np.zeros((times.size, 3, 3))
     frame[:, 0, 0], frame[:, 0, 1] = c, -s
     frame[:, 1, 0], frame[:, 1, 1] = s, c
@@ -105,14 +85,18 @@ class NaiveCore:
         self._source.take(block)
         self._history.take(block)
         self._history.forget_before(block.stop)
-        if not self._history.vane_time.size:
+        history = self._history
+        if not history.nose.time.size:
             return no_estimates()
         times = output_times(block.start, block.stop, self._settings.output_rate)
-        speed, heading = naive_signals(self._history, times)
+        speed = calibrated_speed(history.rotor, history.edges.latest_speed(times))
+        heading = history.nose.latest(times)
         variance = np.square(_RELATIVE_DEVIATION * speed + _LEAST_DEVIATION)
-        vertical = np.full(times.size, _VERTICAL_DEVIATION**2)
+        lift, vertical = None, np.full(times.size, _VERTICAL_DEVIATION**2)
+        if history.elevation is not None:
+            lift, vertical = speed * np.tan(history.elevation.latest(times)), variance
         rows = self._source.at(times, np.zeros(3))
-        return earth_estimates(times, speed, heading, variance, variance, vertical, rows)
+        return earth_estimates(times, speed, heading, variance, variance, vertical, rows, lift)
 
     def finish(self) -> Estimates:
         """Nothing remains."""

@@ -43,7 +43,9 @@ def _first_rate(blocks: list[Block], rotor: Cup | Propeller) -> tuple[float, flo
     return 2.0 * np.pi * rotor.calibration_distance * made / duration, 0.0
 
 
-def _array_wind(rotors: tuple[Cup | Propeller, ...], rates: list[tuple[float, float]]) -> FloatArray:
+def _array_wind(
+    rotors: tuple[Cup | Propeller, ...], rates: list[tuple[float, float]]
+) -> FloatArray:
     """Wind in the sensor frame that fixed propellers show [m/s], shape (3,)."""
     fixed = [
         (rotor, y)

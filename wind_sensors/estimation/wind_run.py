@@ -56,10 +56,16 @@ class RunCounter:
         start: Of the first window [ns].
         length: Of a window [ns].
         use_air: As in the settings.
+
+    Attributes:
+        rotor: The rotor whose run is counted.
+        vane: The vane or bivane that tells the direction.
     """
 
     def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
         self.history = History(station, start, 1.0)
+        self.rotor = self.history.rotor
+        self.vane = self.history.vane
         self._source = CircumstanceSource(station, use_air)
         self._start = start
         self._length = length
@@ -71,8 +77,7 @@ class RunCounter:
     @property
     def starting_speed(self) -> float:
         """Calibration offset [m/s]."""
-        rotor = self.history.rotor
-        return rotor.starting_speed if isinstance(rotor, Cup) else 0.0
+        return self.rotor.starting_speed if isinstance(self.rotor, Cup) else 0.0
 
     def take(self, block: Block) -> None:
         """Add a block; some are kept and summed together."""
@@ -101,14 +106,14 @@ class RunCounter:
         self._source.take(block)
         readings, edges = h.take(block)
         if readings:
-            times, heading = h.vane_time[-readings:], h.heading[-readings:]
+            times, heading = h.nose.time[-readings:], h.nose.angle[-readings:]
             unit, carried = self._directions(times, heading)
             for sums, part in self._windows(times):
                 sums.readings += int(np.count_nonzero(part))
                 sums.time_directions += unit[part].sum(axis=0)
                 sums.carried += carried[part].sum(axis=0)
-        if edges and h.vane_time.size:
-            self._sum_edges(h.edge_time[-edges:], h.edge_angle[-edges:])
+        if edges and h.nose.time.size:
+            self._sum_edges(h.edges.time[-edges:], h.edges.angle[-edges:])
         h.forget_before(block.stop)
 
     def _sum_edges(self, times: TimeArray, angle: FloatArray) -> None:
@@ -118,7 +123,7 @@ class RunCounter:
         turned = np.diff(angle, prepend=self._last_angle)
         dt = np.diff(times, prepend=self._last_time) * 1e-9
         self._last_time, self._last_angle = int(times[-1]), float(angle[-1])
-        unit, _ = self._directions(times, np.interp(times, h.vane_time, h.heading))
+        unit, _ = self._directions(times, np.interp(times, h.nose.time, h.nose.angle))
         for sums, part in self._windows(times):
             sums.edges += int(np.count_nonzero(part))
             sums.turned += float(turned[part].sum())

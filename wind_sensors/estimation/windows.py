@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.estimation.array_run import ArrayRunCounter
 from wind_sensors.estimation.bias_terms import WindowTurbulence, predicted_terms, vane_loss
+from wind_sensors.estimation.constants import is_array, measures_vertical
 from wind_sensors.estimation.core import Estimates, SmallScales
 from wind_sensors.estimation.intake import Block
 from wind_sensors.estimation.outputs import WindowStatistics
@@ -36,6 +38,7 @@ class _Sums:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     own_trace: float = 0.0
     speed: float = 0.0
+    pointing: FloatArray = field(default_factory=lambda: np.zeros(2))
     along: float = 0.0
     across: float = 0.0
     blocks: int = 0
@@ -53,7 +56,8 @@ class WindowAccumulator:
         self._station = station
         self._settings = settings
         self._length = round(settings.window * 1e9)
-        self._counter: RunCounter | None = None
+        self._counter: RunCounter | ArrayRunCounter | None = None
+        self._vertical_is_measured = measures_vertical(station)
         self._start = 0
         self._last = 0
         self._number = 0
@@ -64,7 +68,8 @@ class WindowAccumulator:
     ) -> list[WindowStatistics]:
         """Add a block and the estimates that became final with it; windows that are complete."""
         if self._counter is None:
-            self._counter = RunCounter(
+            kind = ArrayRunCounter if is_array(self._station) else RunCounter
+            self._counter = kind(
                 self._station, block.start, self._length, self._settings.use_air
             )
             self._start = block.start
@@ -110,6 +115,7 @@ class WindowAccumulator:
         s.covariance += p.sum(axis=0)
         s.own_trace += float(np.trace(estimates.apparent_covariance[part], axis1=1, axis2=2).sum())
         s.speed += float(np.sum(h + 0.5 * across / safe))
+        s.pointing += (east.sum(), north.sum())
         if small is not None:
             s.along += small.along
             s.across += small.across
@@ -129,7 +135,7 @@ class WindowAccumulator:
     def _statistics(self, s: _Sums, run: RunSums, start: int, stop: int) -> WindowStatistics:
         assert self._counter is not None
         duration = max((stop - start) * 1e-9, 1e-9)
-        rotor, vane = self._counter.history.rotor, self._counter.history.vane
+        rotor, vane = self._counter.rotor, self._counter.vane
         length = rotor.calibration_distance
         mean = s.velocity / s.count
         speed = s.speed / s.count
@@ -158,8 +164,11 @@ class WindowAccumulator:
             arithmetic = (run.rates / run.intervals + offset) / (mean_rate + offset) - 1.0
         terms = predicted_terms(rotor, vane, state, arithmetic)
         covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
-        seen = 1.0 - float(np.sum(np.square(run.directions))) / max(run.turned, 1e-9) ** 2
-        loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
+        if vane is None:
+            seen, loss = 1.0 - float(np.sum(np.square(s.pointing / s.count))), 0.0
+        else:
+            seen = 1.0 - float(np.sum(np.square(run.directions))) / max(run.turned, 1e-9) ** 2
+            loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
         across_variance = float(across_direction @ covariance @ across_direction)
         independent = max(duration / _CORRELATION_TIME / 10.0, 1.0)
@@ -190,7 +199,7 @@ class WindowAccumulator:
     def _raw(self, run: RunSums, duration: float) -> tuple[FloatArray, float]:
         """Vector mean by wind run (K94 (83)) and count mean [m/s], by the calibration."""
         assert self._counter is not None
-        length = self._counter.history.rotor.calibration_distance
+        length = self._counter.rotor.calibration_distance
         offset = self._counter.starting_speed if run.edges else 0.0
         readings = max(run.readings, 1)
         vector = length * run.directions / duration
@@ -215,5 +224,6 @@ class WindowAccumulator:
         mean_covariance = np.eye(3) * (
             averaged + mount + (_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2
         )
-        mean_covariance[2, 2] = total[2, 2]
+        if not self._vertical_is_measured:
+            mean_covariance[2, 2] = total[2, 2]
         return mean_covariance, bias_covariance
