@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from proving_ground.inflow import Array
 
@@ -90,7 +91,7 @@ def slow_wind(rng: np.random.Generator, time: Array, weather: Weather) -> SlowWi
     heading = heading + weather.veer * time / duration
     for _ in range(weather.gust_fronts):
         arrival = rng.uniform(0.1, 0.85) * duration
-        rise = 1.0 / (1.0 + np.exp(-(time - arrival) / rng.uniform(0.6, 2.5)))
+        rise = expit((time - arrival) / rng.uniform(0.6, 2.5))
         relax = np.exp(-np.maximum(time - arrival, 0.0) / rng.uniform(40.0, 150.0))
         speed = speed * (1.0 + rng.uniform(0.25, 0.7) * rise * relax)
         heading = heading + rng.normal(0.0, 0.5) * rise * relax
