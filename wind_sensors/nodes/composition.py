@@ -17,7 +17,10 @@ from wind_sensors.nodes.topics import station_topics
 from wind_sensors.recordings import load_station
 
 _SETTLING = 0.5
-"""Wall time after which silence means that everything under way has arrived [s]."""
+"""Silence after which the last messages are taken to be through [s of wall time]."""
+
+_PATIENCE = 5.0
+"""The same while the estimator has not received all that was sent."""
 
 
 class Composition:
@@ -89,7 +92,9 @@ class Composition:
         if self._finished_at is None:
             self._finished_at = now
         silence = now - max(self._finished_at, self.estimator.received_at)
-        if silence < _SETTLING:
+        topics = self.estimator.topics
+        sent = sum(n for t, n in self.simulator.published_by_topic().items() if t in topics)
+        if silence < (_SETTLING if self.estimator.received >= sent else _PATIENCE):
             return False
         if not self._flushed:
             self._flushed = True

@@ -342,10 +342,10 @@ class EstimatorNode(Node):
 
     def _receiver(self, receive: Any) -> Any:
         def received(message: Any) -> None:
-            self.received_at = time.monotonic()
-            self._idle_checks = 0
             receive(message)
             self._publish()
+            self.received_at = time.monotonic()
+            self._idle_checks = 0
 
         return received
 

@@ -60,8 +60,8 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         "publish_clock",
         bool,
         False,
-        "Publish simulated time on /clock, starting at the station file's recording.start; "
-        "without it the signals are stamped from now on.",
+        "Publish simulated time on /clock, starting at the station file's recording.start where "
+        "it states one; without it the signals are stamped from now on.",
     ),
     Parameter("publish_truth", bool, False, f"Publish the true wind on {TRUTH_TOPIC}."),
     Parameter(
@@ -89,6 +89,7 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
 """Parameters of the simulator, besides those of its instruments."""
 
 _TICK = 0.002
+_LONGEST_LEAP = 0.05
 _CLOCK_WALL_PERIOD = 10_000_000
 
 
@@ -102,7 +103,6 @@ class SimulatorNode(Node):
 
     Attributes:
         finished: `duration` has passed and everything has been published.
-        published: Messages so far.
 
     Raises:
         UserError: The station or a parameter is wrong.
@@ -116,7 +116,6 @@ class SimulatorNode(Node):
         where = f"parameters of {self.get_fully_qualified_name()}"
         self.station: Station = station_with(document, instruments, where)
         self.finished = False
-        self.published = 0
         self._speed = _number(values["speed"])
         self._waits_for = int(_number(values["wait_for_subscribers"]))
         self._with_clock = bool(values["publish_clock"])
@@ -132,6 +131,7 @@ class SimulatorNode(Node):
             topic: advertise(self, message_type, topic, output_quality(depth))
             for topic, message_type in encoder.topics.items()
         }
+        self._counts = dict.fromkeys(encoder.topics, 0)
         self._clock_outlet = (
             advertise(self, ClockMessage, "/clock", output_quality(1)) if self._with_clock else None
         )
@@ -140,10 +140,12 @@ class SimulatorNode(Node):
         # A first look compiles the kernels, which must not delay the stream once it runs.
         self._events: Iterator[Event] = live_events(SignalStream(self.station, self._scenario))
         self._next_event = next(self._events)
-        self._started: float | None = None
+        self._running = False
+        self._elapsed = 0.0
+        self._ticked_at = 0.0
         self._ready_at = 0.0
         self._instrument_topics = instrument_topics(self.station)
-        self._late = 0.0
+        self._burst = 0.0
         self._timer = self.create_timer(
             _TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -152,14 +154,22 @@ class SimulatorNode(Node):
     @property
     def elapsed(self) -> float:
         """Simulated time since the start [s]."""
-        if self._started is None:
-            return 0.0
-        return min((time.monotonic() - self._started) * self._speed, self._duration)
+        return self._elapsed
+
+    @property
+    def published(self) -> int:
+        """Messages so far."""
+        return sum(self._counts.values())
+
+    def published_by_topic(self) -> dict[str, int]:
+        """Messages so far by resolved topic."""
+        return {self.resolve_topic_name(topic): n for topic, n in self._counts.items()}
 
     def _tick(self) -> None:
         if self.finished or not self._has_started():
             return
-        now = self._begin + round(self.elapsed * 1e9)
+        wall = self._move_time_on()
+        now = self._begin + round(self._elapsed * 1e9)
         while self._next_event.arrival <= now:
             event = self._next_event
             if event.arrival >= self._begin + self._duration * 1e9:
@@ -167,22 +177,31 @@ class SimulatorNode(Node):
             self._tell_time(event.arrival)
             for topic, message in self._encoder.encode(event):
                 self._outlets[topic].publish(message)
-                self.published += 1
+                self._counts[topic] += 1
             self._next_event = next(self._events)
         self._tell_time(now)
-        passed = self._begin + round(self.elapsed * 1e9)
-        self._late = (passed - now) * 1e-9 / self._speed
-        if self.elapsed >= self._duration:
+        self._burst = time.monotonic() - wall
+        if self._elapsed >= self._duration:
             self.finished = True
             self.get_logger().info(f"The simulation has ended: {self.published} messages.")
 
+    def _move_time_on(self) -> float:
+        wall = time.monotonic()
+        passed = wall - self._ticked_at
+        if self._with_clock:
+            # Simulated time may go slowly on a busy machine, but it must not leap.
+            passed = min(passed, _LONGEST_LEAP)
+        self._elapsed = min(self._elapsed + passed * self._speed, self._duration)
+        self._ticked_at = wall
+        return wall
+
     def _has_started(self) -> bool:
-        if self._started is None:
+        if not self._running:
             if self._lonely_topics():
                 self._ready_at = time.monotonic() + SETTLING
             elif time.monotonic() >= self._ready_at:
                 self._start()
-        return self._started is not None
+        return self._running
 
     def _lonely_topics(self) -> list[str]:
         return sorted(
@@ -192,11 +211,14 @@ class SimulatorNode(Node):
         )
 
     def _start(self) -> None:
-        self._begin = recording_start(self.station) if self._with_clock else time.time_ns()
+        stated = recording_start(self.station) if self._with_clock else 0
+        # Zero means "no time" to ROS, so a station file that states no start begins now.
+        self._begin = stated or time.time_ns()
         self._events = live_events(SignalStream(self.station, self._scenario, self._begin))
         self._next_event = next(self._events)
         self._next_clock = self._begin
-        self._started = time.monotonic()
+        self._ticked_at = time.monotonic()
+        self._running = True
 
     def _tell_time(self, now: int) -> None:
         if self._clock_outlet is not None and now >= self._next_clock:
@@ -208,9 +230,9 @@ class SimulatorNode(Node):
             "simulated time": f"{self.elapsed:.1f} s",
             "messages": str(self.published),
             "speed": f"{self._speed:g}",
-            "time spent in the last burst": f"{self._late * 1e3:.1f} ms",
+            "time spent in the last burst": f"{self._burst * 1e3:.1f} ms",
         }
-        if self._started is None:
+        if not self._running:
             text = f"Waiting for subscribers of {', '.join(self._lonely_topics())}."
             yield Status("simulation", Level.WARN, text, details)
         elif self.finished:
