@@ -19,6 +19,9 @@ _SURPRISE = 3.5
 """Innovations beyond this many standard deviations make the filter look for the wind again."""
 _CALM = 0.3
 """[m/s]"""
+_AMBIGUOUS = 0.35
+"""Uncertainty of the turned angle [slots] from which an edge no longer tells how many slots have
+passed."""
 _RARE = 7.0
 """Log of the odds against a lost or an extra edge before any was seen."""
 _FAR_OUT = 5.0
@@ -95,6 +98,11 @@ def correct_by_edge(
     expected = (number + f.slot_error[r, place]) * width
     off = (expected - f.mean[measured]) / width
     spread = math.sqrt(f.covariance[measured, measured]) / width
+    if spread > _AMBIGUOUS:
+        _forget_angle(f, ring, slot, r, expected)
+        f.last_used[r] = time
+        f.slot_interval[r] = 0.0
+        return
     lost = -math.floor(off + 0.5)
     interval = (time - f.last_used[r]) * 1e-9 / f.stride[r]
     even = (1.0 + 0.5 * lost / f.stride[r]) * f.slot_interval[r]
@@ -129,6 +137,32 @@ def correct_by_edge(
     ring.which[slot] = r
     ring.slot[slot] = place
     _note(f, r, squared)
+
+
+@compiled
+def _forget_angle(f: FilterState, ring: Ring, slot: int, r: int, angle: float) -> None:
+    """Count anew from an edge after too long a silence: only the rotor's angle is known then.
+
+    The step's transition loses the row of the angle, so that the smoother draws nothing from it.
+    """
+    n = f.mean.shape[0]
+    state = WIND_STATES + 2 * r + 1
+    width = 2.0 * math.pi / f.slots[r]
+    if ring.moved[slot] == 0:
+        ring.moved[slot] = 1
+        ring.decay[slot, :] = 1.0
+        ring.noise[slot, :, :] = 0.0
+        ring.noise_gain[slot, :, :] = 0.0
+        ring.transition[slot, :, :] = 0.0
+        for k in range(n - WIND_STATES):
+            ring.transition[slot, k, WIND_STATES + k] = 1.0
+    ring.transition[slot, 2 * r + 1, :] = 0.0
+    ring.noise_gain[slot, 2 * r + 1, :] = 0.0
+    f.mean[state] = angle
+    for k in range(n):
+        f.covariance[state, k] = 0.0
+        f.covariance[k, state] = 0.0
+    f.covariance[state, state] = f.edge_variance[r] * width * width
 
 
 @compiled

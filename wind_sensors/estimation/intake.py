@@ -21,6 +21,8 @@ PULSES, READINGS, PLATFORM, TEMPERATURE, PRESSURE = range(5)
 _CONFIRMED = 3
 """So many messages in a row make a jump of the clock believable."""
 _FAR_AHEAD_NS = 60_000_000_000
+_INTERVALS_AHEAD = 1.5
+"""So many intervals between states of the platform are waited for, so that one may be missing."""
 
 
 class Series(NamedTuple):
@@ -92,7 +94,8 @@ class Intake:
         inputs: Kind, width and clock correction by input name.
         block_ns: Length of a block.
         wait_ns: How long to wait for messages that arrive late.
-        look_ahead_ns: How much of the platform's motion after a block is released with it.
+        look_ahead_ns: How much of the platform's motion after a block is released with it, at
+            least and at most; between them as much as a slow source needs for its next state.
         gap_ns: Silence that counts as a gap.
         jump_ns: Step back of the clock that counts as a jump.
     """
@@ -102,7 +105,7 @@ class Intake:
         inputs: dict[str, tuple[int, int, Correction | None]],
         block_ns: int,
         wait_ns: int,
-        look_ahead_ns: int,
+        look_ahead_ns: tuple[int, int],
         gap_ns: int,
         jump_ns: int,
     ) -> None:
@@ -110,7 +113,8 @@ class Intake:
         self._corrections = {name: c for name, (_, _, c) in inputs.items() if c is not None}
         self._block = block_ns
         self._wait = wait_ns
-        self._look_ahead = look_ahead_ns
+        self._look_ahead, self._longest_look_ahead = look_ahead_ns
+        self._shortest_look_ahead = self._look_ahead
         self._gap = gap_ns
         self._jump = jump_ns
         self.jumps = 0
@@ -130,7 +134,6 @@ class Intake:
             record.values.clear()
         self.origin = None
         self.released = 0
-        self.watermark = 0
         self._seen = False
         self._early.clear()
         self._astray.clear()
@@ -160,15 +163,22 @@ class Intake:
             self._astray.clear()
         self._astray.append((name, time, value))
         if len(self._astray) < _CONFIRMED:
-            self.far_ahead += 1
+            self._count_stray(name, time, 1)
             return False
         self.jumps += 1
         return True
 
+    def _count_stray(self, name: str, time: int, change: int) -> None:
+        if time < self.watermark:
+            self.records[name].late += change
+        else:
+            self.far_ahead += change
+
     def restart(self) -> None:
         """After a jump: forget, and begin with the messages that proved it."""
         proof = list(self._astray)
-        self.far_ahead -= len(proof) - 1
+        for name, time, _ in proof[:-1]:
+            self._count_stray(name, time, -1)
         self.forget()
         for name, time, value in proof:
             self.add(name, time, value)
@@ -225,15 +235,26 @@ class Intake:
         seconds = self._block * 1e-9
         for name, record in self.records.items():
             self._account(record, parts[name], seconds)
+        look_ahead = self._look_ahead
+        self._follow_platform_rate()
         return Block(
             start=start,
             stop=stop,
             pulses=self._of_kind(PULSES, parts),
             readings=self._of_kind(READINGS, parts),
-            platform=self._single(PLATFORM, parts, stop + self._look_ahead),
+            platform=self._single(PLATFORM, parts, stop + look_ahead),
             temperature=self._single(TEMPERATURE, parts, stop),
             pressure=self._single(PRESSURE, parts, stop),
         )
+
+    def _follow_platform_rate(self) -> None:
+        """Look far enough ahead to see the next state of a slow platform, within bounds."""
+        for record in self.records.values():
+            if record.kind == PLATFORM and record.rate > 0.0:
+                wanted = round(_INTERVALS_AHEAD * 1e9 / record.rate)
+                self._look_ahead = min(
+                    max(wanted, self._shortest_look_ahead), self._longest_look_ahead
+                )
 
     def _of_kind(self, kind: int, parts: dict[str, Series]) -> dict[str, Series]:
         return {n: parts[n] for n, r in self.records.items() if r.kind == kind}

@@ -1,0 +1,230 @@
+"""Streams: order, doubles, delays, gaps and clocks do not change what the stamps say."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from estimation_cases import blown, feed, mast, messages, truth_at
+
+from wind_sensors.errors import UserError
+from wind_sensors.estimation import EstimatorSettings, HealthLevel, make_estimator, process
+from wind_sensors.estimation.core import Estimates
+from wind_sensors.station.signals import Recording
+
+SETTINGS = EstimatorSettings(window=20.0)
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return blown(mast(), duration=50.0)
+
+
+def run(stream: list, settings: EstimatorSettings = SETTINGS):  # type: ignore[type-arg, no-untyped-def]
+    estimator = make_estimator(mast(), settings)
+    feed(estimator, stream)
+    estimator.flush()
+    return estimator, estimator.take_estimate_arrays()
+
+
+def same(a: Estimates, b: Estimates) -> bool:
+    return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+
+
+def delayed(stream: list, longest: float, seed: int) -> list:  # type: ignore[type-arg]
+    """The stream in the order of arrival when every message is late by up to `longest` seconds."""
+    chance = random.Random(seed)
+    return sorted(stream, key=lambda m: m[2] + chance.random() * longest * 1e9)
+
+
+def item(estimator, name: str):  # type: ignore[no-untyped-def]
+    return next(i for i in estimator.health() if i.name == name)
+
+
+@pytest.mark.parametrize("method", ["kalman", "inverse", "naive"])
+def test_order_of_arrival_and_doubles_do_not_change_a_bit(
+    recording: Recording, method: str
+) -> None:
+    settings = EstimatorSettings(method=method, window=20.0)  # type: ignore[arg-type]
+    stream = messages(recording)
+    _, straight = run(stream, settings)
+    mixed = delayed(stream + stream[100:400], 0.15, 5)
+    estimator, shuffled = run(mixed, settings)
+    assert straight.time.size > 900
+    assert same(straight, shuffled)
+    doubled = [int(item(estimator, n).values["doubled"]) for n in ("cup", "vane")]
+    assert sum(doubled) == 300
+
+
+def test_a_stream_taken_piece_by_piece_equals_the_recording_at_once(recording: Recording) -> None:
+    estimator = make_estimator(mast(), SETTINGS)
+    estimates, windows = [], []
+    for message in messages(recording):
+        feed(estimator, [message])
+        estimates += estimator.take_estimates()
+        windows += estimator.take_windows()
+    assert estimates[-1].time < recording.stop - 8e8
+    estimator.flush()
+    estimates += estimator.take_estimates()
+    windows += estimator.take_windows()
+    at_once = process(recording, SETTINGS)
+    assert np.array_equal([e.time for e in estimates], at_once.time)
+    assert np.array_equal([e.velocity for e in estimates], at_once.velocity)
+    assert np.array_equal([e.covariance for e in estimates], at_once.covariance)
+    assert len(windows) == len(at_once.windows) == 3
+    for a, b in zip(windows, at_once.windows, strict=True):
+        assert np.array_equal(a.vector_mean, b.vector_mean)
+        assert a.bias_terms == b.bias_terms
+
+
+def test_memory_does_not_grow_with_the_record() -> None:
+    estimator = make_estimator(mast(), SETTINGS)
+    sizes = []
+    for part in range(3):
+        piece = blown(mast(), duration=40.0, seed=7)
+        shift = part * 40_000_000_000
+        feed(estimator, [(k, n, t + shift, v) for k, n, t, v in messages(piece)])
+        estimator.take_estimates()
+        ring = estimator._core._ring  # type: ignore[union-attr]
+        waiting = sum(len(r.times) for r in estimator._intake.records.values())
+        sizes.append((ring.time.size, waiting < 400))
+    assert sizes[1] == sizes[2]
+
+
+def test_late_messages_are_counted_and_left_out(recording: Recording) -> None:
+    stream = messages(recording)
+    early = stream[200]
+    estimator, _ = run([*stream[:1500], early, *stream[1500:]])
+    assert int(item(estimator, early[1]).values["late"]) == 1
+
+
+def test_readings_that_are_no_numbers_are_skipped(recording: Recording) -> None:
+    stream = messages(recording)
+    broken = [
+        (k, n, t, float("nan") if k == "angle" and i % 50 == 0 else v)
+        for i, (k, n, t, v) in enumerate(stream)
+    ]
+    estimator, found = run(broken)
+    assert np.isfinite(found.velocity).all()
+    vane = item(estimator, "vane")
+    assert int(vane.values["not a number"]) > 10
+    assert vane.level == HealthLevel.WARN
+
+
+def test_a_clock_that_jumps_back_starts_the_estimate_anew(recording: Recording) -> None:
+    stream = messages(recording)
+    _, once = run(stream)
+    estimator, twice = run(stream + stream)
+    assert item(estimator, "clock").level == HealthLevel.WARN
+    assert estimator._intake.jumps == 1
+    assert np.array_equal(twice.velocity[: once.time.size], once.velocity)
+    assert np.array_equal(twice.velocity[once.time.size :], once.velocity)
+
+
+def test_one_stray_stamp_does_not_move_the_clock(recording: Recording) -> None:
+    stream = messages(recording)
+    _, straight = run(stream)
+    stray = ("angle", "vane", stream[700][2] + 3_600_000_000_000, 0.3)
+    estimator, found = run([*stream[:700], stray, *stream[700:]])
+    assert same(straight, found)
+    assert item(estimator, "clock").values["implausible stamps"] == "1"
+
+
+def test_a_gap_widens_the_covariance_and_is_reported(recording: Recording) -> None:
+    start = recording.start
+    stream = [m for m in messages(recording) if not 25e9 < m[2] - start < 30e9]
+    estimator = make_estimator(mast(), SETTINGS)
+    feed(estimator, stream)
+    estimator.flush()
+    found = estimator.take_estimate_arrays()
+    since = (found.time - start) * 1e-9
+    inside = (since > 27.0) & (since < 28.0)
+    outside = (since > 15.0) & (since < 24.0)
+    width = np.sqrt(found.covariance[:, 0, 0])
+    assert width[inside].mean() > 2.5 * width[outside].mean()
+    error = np.abs(found.velocity - truth_at(recording, found.time))[inside, 0]
+    assert error.mean() < 2.0 * width[inside].mean()
+    assert int(item(estimator, "vane").values["gaps"]) == 1
+
+
+def test_a_stopped_rotor_is_noticed_and_the_wind_is_small() -> None:
+    station = mast()
+    blowing = blown(station, duration=20.0)
+    end = blowing.stop
+    stream = messages(blowing)
+    still = [("angle", "vane", end + k * 50_000_000, 0.3) for k in range(600)]
+    estimator, found = run(stream + still)
+    assert item(estimator, "cup").level == HealthLevel.WARN
+    assert "stopped" in item(estimator, "cup").message
+    late = found.time > end + 25_000_000_000
+    speed = np.hypot(found.velocity[late, 0], found.velocity[late, 1])
+    deviation = np.sqrt(found.covariance[late, 0, 0] + found.covariance[late, 1, 1])
+    assert np.all(speed < 3.0 * deviation + 0.5)
+    assert np.median(speed) < 1.0
+
+
+@pytest.mark.parametrize("share", [0.1])
+def test_lost_edges_are_restored(recording: Recording, share: float) -> None:
+    chance = random.Random(9)
+    stream = [m for m in messages(recording) if m[0] == "angle" or chance.random() > share]
+    _, whole = run(messages(recording))
+    estimator, found = run(stream)
+    error = np.hypot(*(found.velocity - whole.velocity)[100:, :2].T)
+    assert np.sqrt(np.mean(error**2)) < 0.25
+    assert abs(np.hypot(*found.velocity[100:, :2].T).mean()
+               / np.hypot(*whole.velocity[100:, :2].T).mean() - 1.0) < 0.003  # fmt: skip
+    edges = item(estimator, "cup edges")
+    assert edges.level == HealthLevel.WARN
+    assert int(edges.values["lost edges"]) > 0.08 * len(recording.pulses["cup"].time)
+
+
+def test_bouncing_contacts_are_left_out(recording: Recording) -> None:
+    chance = random.Random(4)
+    stream = messages(recording)
+    false = [(k, n, t + 2_000_000, v) for k, n, t, v in stream if k == "pulse"]
+    bounced = sorted(
+        stream + [m for m in false if chance.random() < 0.05], key=lambda m: m[2]
+    )
+    _, clean = run(stream)
+    estimator, found = run(bounced)
+    error = np.hypot(*(found.velocity - clean.velocity)[100:, :2].T)
+    assert np.sqrt(np.mean(error**2)) < 0.1
+    assert item(estimator, "cup edges").level == HealthLevel.WARN
+
+
+def test_silence_of_everything_is_told_by_advance(recording: Recording) -> None:
+    estimator = make_estimator(mast(), SETTINGS)
+    feed(estimator, messages(recording))
+    estimator.advance(recording.stop + 15_000_000_000)
+    assert item(estimator, "vane").level == HealthLevel.STALE
+    assert item(estimator, "cup").level == HealthLevel.WARN
+
+
+def test_a_counter_or_an_encoder_serves_as_well_as_edges(recording: Recording) -> None:
+    stream = messages(recording)
+    _, by_edges = run(stream)
+    estimator = make_estimator(mast(), SETTINGS)
+    turns = 0
+    for kind, name, time, value in stream:
+        if kind == "pulse":
+            turns += 1
+            estimator.add_pulse(name, time, turns / 4.0)
+        else:
+            estimator.add_angle(name, time, value)
+    estimator.flush()
+    by_count = estimator.take_estimate_arrays()
+    both = np.hypot(*(by_count.velocity - by_edges.velocity)[200:, :2].T)
+    assert np.sqrt(np.mean(both**2)) < 0.1
+
+
+def test_a_station_without_vane_is_refused_with_a_remedy() -> None:
+    station = mast()
+    lonely = station.model_copy(update={"instruments": station.instruments[:1]})
+    with pytest.raises(UserError, match="vane"):
+        make_estimator(lonely)
+
+
+def test_settings_out_of_range_name_themselves() -> None:
+    with pytest.raises(UserError, match="smoother_lag"):
+        EstimatorSettings(smoother_lag=-1.0)
