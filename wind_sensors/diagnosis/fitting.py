@@ -171,7 +171,7 @@ class Problem:
                 columns.append(np.zeros_like(base))
             else:
                 columns.append((vector - base) / shift)
-        return np.array(columns).T
+        return np.asarray(np.array(columns).T, dtype=np.float64)
 
 
 def fit(
@@ -228,7 +228,9 @@ def fit(
         if not improved or gained < 0.02 + 1e-5 * cost:
             break
     information = normal / np.outer(scale, scale)
-    covariance = np.linalg.pinv(information + np.diag(1e-9 / (high - low) ** 2))
+    covariance = np.asarray(
+        np.linalg.pinv(information + np.diag(1e-9 / (high - low) ** 2)), dtype=np.float64
+    )
     fitted = _with_values(terms, values)
     active = int(np.count_nonzero(np.diag(normal) > 1e-4))
     return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations, active)

@@ -50,12 +50,12 @@ class Grid:
     @property
     def edges(self) -> FloatArray:
         """Edges of the bins, seconds since `start`, shape (n + 1,)."""
-        return np.arange(self.n + 1) * self.dt
+        return np.asarray(np.arange(self.n + 1) * self.dt, dtype=np.float64)
 
     @property
     def centres(self) -> FloatArray:
         """Middles of the bins, seconds since `start`, shape (n,)."""
-        return (np.arange(self.n) + 0.5) * self.dt
+        return np.asarray((np.arange(self.n) + 0.5) * self.dt, dtype=np.float64)
 
     def seconds(self, time: TimeArray) -> FloatArray:
         """Seconds since `start`."""

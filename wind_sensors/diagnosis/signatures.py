@@ -90,7 +90,7 @@ def templates_of(
 ) -> list[Template]:
     """All templates that a recording of the station could show."""
     compared = {c.instrument for c in comparison.channels} | {PLATFORM, STATION}
-    out = []
+    out: list[Template] = []
     for name in entries(station):
         if name not in compared:
             continue

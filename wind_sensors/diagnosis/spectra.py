@@ -101,7 +101,9 @@ def coherence_of(measured: FloatArray, simulated: FloatArray, dt: float, n: int)
     count = np.diff(edges)
     raw = c * c / np.maximum(m * s, 1e-300)
     squared = np.clip((raw - 1.0 / count) / (1.0 - 1.0 / count), 0.0, 1.0)
-    frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * n * dt)
+    frequency = np.asarray(
+        0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * n * dt), dtype=np.float64
+    )
     return Coherence(edges, frequency, m, s, c, squared)
 
 

@@ -251,6 +251,7 @@ def diagnose(
     effects: Mapping[str, Effect] | None = None,
     workers: int = 1,
     progress: Callable[[str, float], None] | None = None,
+    with_proof: bool = True,
 ) -> Diagnosis:
     """Find the physics that a station file leaves out.
 
@@ -260,6 +261,7 @@ def diagnose(
         effects: Catalogue; None: all known effects.
         workers: Processes.
         progress: Called with a phase and the share of it that is done.
+        with_proof: Fit and score held-out blocks.
 
     Raises:
         UserError: The recording cannot be compared with its station.
@@ -289,7 +291,7 @@ def diagnose(
     equal = _equal(naming)
     verdict = _verdict(naming, equal, remainder, detectable)
     report("proving")(0.2)
-    findings = _findings(naming, equal, before, bank, baseline) if verdict in {
+    findings = _findings(naming, equal, before, bank, baseline, with_proof) if verdict in {
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
@@ -320,6 +322,7 @@ def _findings(
     before: list[Found],
     bank: RegionBank,
     baseline: Baseline,
+    with_proof: bool,
 ) -> tuple[Finding, ...]:
     whitener = naming.whitener
     estimates = _estimates(naming)
@@ -329,7 +332,9 @@ def _findings(
         if a.fit.terms[-1].key not in {t.key for t in naming.fit.terms}
     )
     placebo = naming.alternatives[0].fit.terms if naming.alternatives else ()
-    proof = prove(whitener, baseline.station, naming.fit.terms, placebo)
+    proof = (
+        prove(whitener, baseline.station, naming.fit.terms, placebo) if with_proof else None
+    )
     misfit = float(naming.nothing @ naming.nothing)
     out = []
     for k, term in enumerate(naming.fit.terms):

@@ -98,9 +98,20 @@ def true_motion(platform: Platform, reported: Motion, dt: float, elapsed: float 
         )
     if platform.velocity_axes == "earth":
         motion = replace(motion, velocity=rotations.rotate_back(motion.attitude, motion.velocity))
+    if platform.velocity_turn_deg != 0.0:
+        motion = replace(
+            motion, velocity=_turned_velocity(motion.velocity, -platform.velocity_turn_deg)
+        )
     if platform.velocity_scale != 1.0:
         motion = replace(motion, velocity=motion.velocity / platform.velocity_scale)
     return motion
+
+
+def _turned_velocity(velocity: FloatArray, degrees: float) -> FloatArray:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    x, y, z = velocity.T
+    turned: FloatArray = np.stack((c * x - s * y, s * x + c * y, z), axis=1)
+    return turned
 
 
 def reported_motion(platform: Platform, motion: Motion) -> Motion:
@@ -111,6 +122,8 @@ def reported_motion(platform: Platform, motion: Motion) -> Motion:
     out = motion
     if platform.velocity_scale != 1.0:
         out = replace(out, velocity=out.velocity * platform.velocity_scale)
+    if platform.velocity_turn_deg != 0.0:
+        out = replace(out, velocity=_turned_velocity(out.velocity, platform.velocity_turn_deg))
     if platform.velocity_axes == "earth":
         out = replace(out, velocity=rotations.rotate(out.attitude, out.velocity))
     declination = _declination(platform)

@@ -323,12 +323,34 @@ class HeadingDeviation(Entry):
 
 
 class Downwash(Entry):
-    """Rotor inflow of a multirotor at the sensor."""
+    """Rotor inflow of a multirotor at the sensor.
+
+    Its size is given as it was identified (`induced_velocity`), or by momentum theory from the
+    rotors (`thrust` or `hover_power`, with `disc_area` and `sensor_share`).
+    """
 
     induced_velocity: float = 0.0
     """Vertical induced velocity at hover, at the sensor [m/s], positive downwards."""
     wake_skew: float = 0.0
     """Horizontal share of it per unit of airspeed over induced velocity."""
+    thrust: NonNegative = 0.0
+    """Of all rotors at hover [N], about the weight: v_h = sqrt(T / (2 rho A))."""
+    hover_power: NonNegative = 0.0
+    """Shaft power at hover [W], instead of `thrust`: v_h = (M P / (2 rho A))^(1/3)."""
+    figure_of_merit: float = Field(default=0.7, gt=0.0, le=1.0)
+    """M, ideal over shaft power at hover, with `hover_power`."""
+    disc_area: NonNegative = 0.0
+    """A, swept by all rotors together [m^2]."""
+    sensor_share: float = Field(default=0.0, ge=-2.0, le=2.0)
+    """Induced velocity at the sensor over that in the discs."""
+
+    @model_validator(mode="after")
+    def _one_source_with_its_area(self) -> Downwash:
+        if self.thrust and self.hover_power:
+            raise ValueError("give thrust or hover_power, not both")
+        if (self.thrust or self.hover_power) and not self.disc_area:
+            raise ValueError("thrust and hover_power need disc_area, the area of all rotors [m^2]")
+        return self
 
 
 class Platform(Entry):
@@ -350,6 +372,8 @@ class Platform(Entry):
     """Convention of the odometry: ENU with forward-left-up axes, or NED with forward-right-down."""
     velocity_axes: Literal["platform", "earth"] = "platform"
     """Axes in which the velocity is reported."""
+    velocity_turn_deg: float = 0.0
+    """Turn of the reported velocity against those axes, counter-clockwise about up."""
     velocity_share: float = 1.0
     """Share of the platform's velocity that reaches the sensor's signals (0: already removed)."""
     heading_deviation: HeadingDeviation = HeadingDeviation()
@@ -366,6 +390,10 @@ class Platform(Entry):
     """Standard deviation of the reported attitude."""
     velocity_noise: NonNegative = 0.05
     """Standard deviation of the reported velocity [m/s]."""
+    angular_rate_noise_deg: NonNegative = 0.0
+    """Standard deviation of the reported angular rate [deg/s]; acts through `sensor_position`."""
+    mounting_noise_deg: NonNegative = 0.0
+    """Standard deviation of `sensor_rotation_deg` against the truth."""
 
 
 class Change(Entry):

@@ -145,40 +145,42 @@ def _rotation(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Platform)
     roll, pitch, yaw = entry.sensor_rotation_deg
     return {
-        "sensor_rotation_deg": (
-            roll + values["roll"],
-            pitch + values["pitch"],
-            yaw + values["yaw"],
-        )
+        "sensor_rotation_deg": (roll + values["roll"], pitch + values["pitch"], yaw),
+        "velocity_turn_deg": entry.velocity_turn_deg + values["velocity_turn"],
     }
 
 
 def _rotation_size(values: Values) -> float:
-    return math.hypot(values["roll"], values["pitch"], values["yaw"]) / 3.0
+    lean = math.hypot(values["roll"], values["pitch"])
+    return max(lean, abs(values["velocity_turn"])) / 6.0
 
 
 FRAME_ERROR = Effect(
     name="frame_error",
-    meaning="The sensor's frame is turned against what the station file says.",
+    meaning="The carrier's velocity or the sensor is in another frame than stated.",
     entrance="wind",
-    equation="sensor axes = R(roll, pitch, yaw) carrier axes",
+    equation="V true = R(-turn) V reported; sensor axes = R(roll, pitch) carrier axes",
     source="REP-103",
-    region="all headings alike",
+    region="with the carrier's speed, or while it leans",
     parameters=(
-        Parameter("roll", "deg", -180.0, 180.0, minimum=3.0, step=0.5),
-        Parameter("pitch", "deg", -180.0, 180.0, minimum=3.0, step=0.5),
-        Parameter("yaw", "deg", -270.0, 270.0, minimum=3.0, step=0.5, starts=(90.0, -90.0, 180.0)),
+        Parameter("roll", "deg", -90.0, 90.0, minimum=6.0, step=0.5),
+        Parameter("pitch", "deg", -90.0, 90.0, minimum=6.0, step=0.5),
+        Parameter(
+            "velocity_turn", "deg", -270.0, 270.0, minimum=6.0, step=1.0,
+            starts=(20.0, -20.0, 90.0, -90.0, 180.0),
+        ),
     ),
     applies=_is_platform,
     update=_rotation,
     templates=(
-        {"roll": 3.0, "pitch": 0.0, "yaw": 0.0},
-        {"roll": 0.0, "pitch": 3.0, "yaw": 0.0},
-        {"roll": 0.0, "pitch": 0.0, "yaw": 3.0},
+        {"roll": 3.0, "pitch": 0.0, "velocity_turn": 0.0},
+        {"roll": 0.0, "pitch": 3.0, "velocity_turn": 0.0},
+        {"roll": 0.0, "pitch": 0.0, "velocity_turn": 6.0},
     ),
     confusable={
         "vane_offset": "sight the vane's mark along the keel",
-        "heading_deviation": "a full circle",
+        "heading_deviation": "a full circle at rest: a wrong velocity frame falls silent",
+        "platform_velocity_scale": "a run on another course against an independent log",
     },
     size=_rotation_size,
 )

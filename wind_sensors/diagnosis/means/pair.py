@@ -16,7 +16,7 @@ FloatArray = npt.NDArray[np.float64]
 SLOWEST = 2.0
 """Below this wind [m/s] starting speeds decide, and pairs are not compared."""
 
-MOST_ROWS = 24_000
+MOST_ROWS = 12_000
 SECTORS = 36
 SPEED_CLASSES = (0.0, 5.0, 8.0, 100.0)
 _OUTLIER = 3.0
@@ -137,15 +137,20 @@ class Pair:
         """Wind that both rotors together show, seen through their own inverse models [m/s]."""
         one, two = self.averages.speed[self.first], self.averages.speed[self.second]
         speed = 0.5 * (one + two)
-        for _ in range(4):
+        for _ in range(3):
             off = one - self.readings(station, self.first, speed)
             off = off + two - self.readings(station, self.second, speed)
             speed = np.maximum(speed + 0.5 * off, 0.1)
         return speed
 
-    def residual(self, station: Station) -> FloatArray:
-        """Difference of the two rotors minus its simulation and minus what is normal [m/s]."""
-        speed = self.wind(station)
+    def residual(self, station: Station, speed: FloatArray | None = None) -> FloatArray:
+        """Difference of the two rotors minus its simulation and minus what is normal [m/s].
+
+        Args:
+            station: The station.
+            speed: The wind; None: what the two rotors show through this station.
+        """
+        speed = self.wind(station) if speed is None else speed
         measured = self.averages.speed[self.second] - self.averages.speed[self.first]
         simulated = self.readings(station, self.second, speed) - self.readings(
             station, self.first, speed

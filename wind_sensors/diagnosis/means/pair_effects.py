@@ -39,9 +39,13 @@ def rotor_effects() -> dict[str, Effect]:
             for t in effect.templates
             if any(t[p.name] != p.healthy for p in effect.parameters if p.name not in hidden)
         )
+        parameters = tuple(p for p in effect.parameters if p.name not in hidden)
+        if name == "wake_shadow":
+            # With a reference as close as the other boom, a faster sector here is a wake there.
+            parameters = tuple(replace(p, low=0.0) if p.name == "depth" else p for p in parameters)
         found[name] = replace(
             effect,
-            parameters=tuple(p for p in effect.parameters if p.name not in hidden),
+            parameters=parameters,
             templates=tuple({**t, **rest} for t in templates),
             everywhere=False,
         )

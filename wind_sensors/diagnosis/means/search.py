@@ -31,8 +31,12 @@ EQUAL_T = 2.0
 EQUAL_SHARE = 0.05
 """So are those that lose less than this share of the winner's gain."""
 
+SMALLEST_KEPT = 0.1
+"""Terms below the smallest size worth reporting are kept in the model, or a larger one would take
+their place; below this share of it they are not worth a parameter."""
+
 MOST_TERMS = 8
-CANDIDATES = 7
+CANDIDATES = 9
 DRAWS = 999
 
 
@@ -43,6 +47,7 @@ class Bench:
     Attributes:
         station: The station as commissioned.
         residual: Residual of a station [m/s or rad] on some of the rows.
+        change: From a station, how another station's residual differs in the wind that the first shows.
         noise: Its standard deviation, shape (n,).
         block: Number of the block of each row.
         elapsed: Time of each row [s].
@@ -50,6 +55,7 @@ class Bench:
 
     station: Station
     residual: Residual
+    change: Callable[[Station], Callable[[Station], FloatArray]]
     noise: FloatArray
     block: npt.NDArray[np.intp]
     elapsed: FloatArray
@@ -75,7 +81,12 @@ def bench_of(pair: Pair, station: Station) -> Bench:
     def residual(candidate: Station, rows: BoolArray) -> FloatArray:
         return (pair if rows.all() else pair.rows(rows)).residual(candidate)
 
-    return Bench(station, residual, pair.noise, pair.block, pair.averages.elapsed)
+    def change(base: Station) -> Callable[[Station], FloatArray]:
+        speed = pair.wind(base)
+        before = pair.residual(base, speed)
+        return lambda candidate: pair.residual(candidate, speed) - before
+
+    return Bench(station, residual, change, pair.noise, pair.block, pair.averages.elapsed)
 
 
 def huber(white: FloatArray) -> FloatArray:
@@ -133,6 +144,7 @@ def screen(
     base = planted(bench.station, terms)
     everything = bench.everything
     before = bench.residual(base, everything)
+    change = bench.change(base)
     psi = np.clip(before / bench.noise, -CLIP, CLIP)
     rows: list[tuple[FloatArray, FloatArray, Term]] = []
     for name, effect in effects.items():
@@ -141,7 +153,7 @@ def screen(
                 continue
             for template in effect.templates:
                 term = Term(effect, instrument, template)
-                signature = before - bench.residual(term.planted(base), everything)
+                signature = -change(term.planted(base))
                 g = signature / bench.noise
                 score, power = psi * g, g * g
                 windows = [ALWAYS]
@@ -177,10 +189,11 @@ def screen(
         exceed += int(np.count_nonzero(null.max(axis=1) >= best))
     p = (exceed + 1.0) / (DRAWS + 1.0)
     gain = amplitude**2 * powers.sum(axis=1)
-    found: dict[tuple[str, str, bool], Candidate] = {}
+    found: dict[tuple[object, ...], Candidate] = {}
     for k in np.argsort(-gain):
         term, size = rows[k][2], float(amplitude[k])
-        key = (*term.key, term.interval == ALWAYS)
+        sector = round(term.values.get("bearing_from", 0.0) / 60.0) % 6
+        key = (*term.key, term.interval == ALWAYS, sector)
         if t[k] < 2.5 or key in found:
             continue
         values = {}
@@ -195,7 +208,7 @@ def screen(
             values[parameter.name] = value
         hidden = {k: v for k, v in term.values.items() if k not in values}
         start = replace(term, values={**values, **hidden})
-        if start.relative_size > 0.02:
+        if start.relative_size > 0.5 * SMALLEST_KEPT:
             found[key] = Candidate(start, float(gain[k]))
         if len(found) >= CANDIDATES:
             break
@@ -362,14 +375,13 @@ def search(
 ) -> Explained:
     """Add effects while they explain held-out blocks.
 
-    A term is accepted when the family-wide p value of its screening, the t value of its gain over
-    held-out blocks and its size all say so.
+    A term is accepted when the family-wide p value of its screening and the t value of its gain
+    over held-out blocks say so, whatever its size.
     """
     fits: list[tuple[Term, ...]] = [(), ()]
     terms: tuple[Term, ...] = ()
     costs = [held_out(bench, fits, ())[0]]
     named: list[Named] = []
-    refused: set[tuple[str, str, bool]] = set()
     p = 1.0
     needed = float(stats.t.ppf(1.0 - 0.005, bench.blocks - 1))
     while len(named) < most:
@@ -379,16 +391,15 @@ def search(
             break
         trials: list[tuple[Term, FloatArray, list[tuple[Term, ...]]]] = []
         for candidate in screened.candidates:
-            key = (*candidate.term.key, candidate.term.interval == ALWAYS)
             taken = any(
                 t.key == candidate.term.key and t.effect.name != "wake_shadow" for t in terms
             )
-            if key in refused or (taken and candidate.term.interval == ALWAYS):
+            if taken and candidate.term.interval == ALWAYS:
                 continue
             cost, both = held_out(bench, fits, (candidate.term,))
             whole = fit(bench, terms, (candidate.term,), bench.everything, 4)[0]
             trials.append((whole, costs[-1] - cost, both))
-        trials = [t for t in trials if _large(t[0]) and _t(t[1]) > needed]
+        trials = [t for t in trials if _inside(t[0]) and _t(t[1]) > needed]
         if not trials:
             break
         trials.sort(key=lambda t: -float(t[1].sum()))
@@ -413,9 +424,9 @@ def search(
     return Explained(terms, tuple(named), tuple(costs), p)
 
 
-def _large(term: Term) -> bool:
-    """Large enough to matter, and not at the end of what the search allows."""
-    if term.relative_size < 1.0:
+def _inside(term: Term) -> bool:
+    """Not at the end of what the search allows, and not nothing."""
+    if term.relative_size < SMALLEST_KEPT:
         return False
     for p in term.effect.parameters:
         if p.healthy is None or p.minimum <= 0.0:
@@ -432,6 +443,8 @@ def intervals(
 ) -> list[dict[str, tuple[float, float]]]:
     """95 % intervals of all parameters, from the scatter of their scores over blocks."""
     names = [(k, p) for k, term in enumerate(terms) for p in term.effect.parameters]
+    if not names:
+        return []
     everything = bench.everything
     now = bench.white(planted(bench.station, terms), everything)
     jacobian = np.empty((now.size, len(names)))

@@ -1,0 +1,153 @@
+"""The diagnosis on recordings of the package's own simulator, with a reference that errs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.verdict import Diagnosis, as_json, diagnose
+from wind_sensors.simulation.drive import Drive
+from wind_sensors.simulation.encoder import angle_readings
+from wind_sensors.simulation.pulses import edge_times
+from wind_sensors.simulation.response import respond
+from wind_sensors.station.model import Station
+from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
+
+DT = 0.05
+SECONDS = 400.0
+
+STATION = Station.model_validate(
+    {
+        "instruments": [
+            {
+                "name": "cup", "kind": "cup", "pulses": {"topic": "/cup/pulses"},
+                "pulses_per_revolution": 12, "calibration_distance": 0.14,
+                "starting_speed": 0.1, "distance_constant": 1.8,
+            },
+            {
+                "name": "vane", "kind": "vane", "joint_states": {"topic": "/vane/joint_states"},
+                "distance_constant": 0.5, "damping_ratio": 0.25,
+            },
+        ],
+        "reference": {"topic": {"topic": "/reference/wind"}, "separation": 0.5},
+    }
+)  # fmt: skip
+
+
+def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> np.ndarray:
+    """Gaussian noise with a correlation time [s] and a standard deviation."""
+    decay = np.exp(-DT / seconds)
+    drawn = rng.standard_normal(n + 4000)
+    return size * np.sqrt(1.0 - decay**2) * lfilter([1.0], [1.0, -decay], drawn)[4000:]
+
+
+def recorded(station: Station, seed: int, mean: float = 7.0) -> Recording:
+    """A recording of a station in a wind that its reference sees with errors."""
+    rng = np.random.default_rng(seed)
+    n = int(SECONDS / DT)
+    speed = mean + _noise(rng, n, 60.0, 1.3) + _noise(rng, n, 3.0, 0.8)
+    speed = np.maximum(speed, 0.5)
+    turn = np.radians(20.0 * rng.standard_normal()) + _noise(rng, n, 80.0, 0.5)
+    turn = turn + _noise(rng, n, 2.0, 0.1)
+    wind = np.stack(
+        (speed * np.cos(turn), speed * np.sin(turn), _noise(rng, n, 1.0, 0.35)), axis=1
+    )
+    seen = wind + np.stack([_noise(rng, n, 1.5, 0.25) for _ in range(3)], axis=1)
+    drive = Drive(start_ns=0, dt=DT, wind=wind)
+    response = respond(station, drive)
+    times = drive.times_ns
+    return Recording(
+        name=f"seed-{seed}",
+        station=STATION,
+        start=0,
+        stop=int(times[-1]),
+        pulses={"cup": Pulses(edge_times(response, "cup"))},
+        angles={"vane": Angles(times, angle_readings(response, "vane", times))},
+        reference=Winds(times, seen),
+    )
+
+
+@lru_cache(maxsize=1)
+def baseline() -> Baseline:
+    return learn([recorded(STATION, seed) for seed in range(4)])
+
+
+def diagnosed(effect: str, instrument: str, seed: int = 50, **values: float) -> Diagnosis:
+    station = with_effect(STATION, catalogue()[effect], instrument, values)
+    return diagnose(recorded(station, seed), baseline())
+
+
+@pytest.mark.parametrize("seed", [20, 21])
+def test_nothing_is_named_on_a_healthy_day(seed: int) -> None:
+    assert diagnose(recorded(STATION, seed), baseline()).verdict == "none"
+
+
+@pytest.mark.parametrize(
+    ("effect", "instrument", "parameter", "value"),
+    [
+        ("calibration_drift", "cup", "gain", 0.94),
+        ("rotor_inertia", "cup", "inertia_factor", 3.0),
+        ("vane_offset", "vane", "offset", 6.0),
+        ("vane_friction", "vane", "friction_speed", 2.5),
+        ("timestamp_latency", "vane", "latency", 0.8),
+    ],
+)
+def test_a_planted_effect_gets_its_name_and_its_size(
+    effect: str, instrument: str, parameter: str, value: float
+) -> None:
+    found = diagnosed(effect, instrument, **{parameter: value})
+    assert found.verdict == "named"
+    assert [f.term.key for f in found.findings] == [(effect, instrument)]
+    estimate = found.findings[0].parameters[parameter]
+    healthy = found.findings[0].term.effect.parameters[0].healthy or 0.0
+    assert estimate.value - healthy == pytest.approx(value - healthy, rel=0.1)
+    proof = found.findings[0].proof
+    assert proof is not None
+    assert proof.excess_removed > 0.8
+
+
+def test_the_corrected_station_no_longer_differs() -> None:
+    found = diagnosed("calibration_drift", "cup", gain=0.94)
+    again = diagnose(
+        replace(recorded(found.station, 50), name="again"),
+        replace(baseline(), station=found.station),
+    )
+    assert again.verdict == "none"
+
+
+def test_a_beginning_inside_the_record_is_part_of_the_finding() -> None:
+    effect = catalogue()["vane_offset"]
+    station = with_effect(STATION, effect, "vane", {"offset": 8.0}, (150.0, None))
+    found = diagnose(recorded(station, 51), baseline())
+    assert [f.term.key for f in found.findings] == [("vane_offset", "vane")]
+    begin, end = found.findings[0].term.interval
+    assert begin == pytest.approx(150.0, abs=15.0)
+    assert end is None
+
+
+def test_the_json_has_the_stated_shape() -> None:
+    content = as_json(diagnosed("vane_offset", "vane", offset=6.0))
+    assert set(content) >= {
+        "recording", "verdict", "null_calibrated", "findings", "unexplained", "smallest_detectable",
+    }  # fmt: skip
+    finding = content["findings"][0]
+    assert set(finding) >= {"effect", "instrument", "located", "physics", "equation", "parameters",
+                            "alternatives", "proof"}  # fmt: skip
+    assert set(finding["located"]) >= {"channel", "time", "region", "excess", "unit", "share", "p"}
+    assert set(finding["parameters"]["offset"]) == {"value", "low", "high", "unit"}
+
+
+def test_a_baseline_survives_its_file() -> None:
+    again = Baseline.from_json(baseline().to_json())
+    assert again.station == baseline().station
+    assert again.standing == dict(baseline().standing)
+    for name, channel in baseline().channels.items():
+        assert again.channels[name].exponent == pytest.approx(channel.exponent)

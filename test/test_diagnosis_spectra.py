@@ -1,0 +1,66 @@
+"""The cosine-domain tools of the diagnosis against what they claim."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from wind_sensors.diagnosis import spectra
+
+N, DT = 4096, 0.2
+
+
+def _red(seed: int, n: int = N) -> np.ndarray:
+    return lfilter([1.0], [1.0, -0.95], np.random.default_rng(seed).standard_normal(n))
+
+
+def test_cosine_transform_is_orthonormal() -> None:
+    series = _red(1)
+    coefficients = spectra.to_cosine(series)
+    assert np.sum(coefficients**2) == pytest.approx(np.sum(series**2))
+    assert spectra.from_cosine(coefficients) == pytest.approx(series)
+
+
+def test_bands_cover_every_coefficient_once() -> None:
+    for n in (37, 400, 2249):
+        edges = spectra.band_edges(n)
+        assert edges[0] == 0
+        assert edges[-1] == n
+        assert np.all(np.diff(edges) > 0)
+
+
+@pytest.mark.parametrize(
+    ("reference_error", "own_error", "exponent"), [(1.0, 0.0, 1.0), (0.7, 0.7, 0.5)]
+)
+def test_slope_is_the_power_of_the_coherence_that_the_errors_imply(
+    reference_error: float, own_error: float, exponent: float
+) -> None:
+    slopes, powers = [], []
+    for seed in range(20):
+        truth = _red(seed)
+        reference = truth + reference_error * _red(100 + seed)
+        measured = truth + own_error * _red(200 + seed)
+        coherence = spectra.coherence_of(
+            spectra.to_cosine(measured), spectra.to_cosine(reference), DT, N
+        )
+        slopes.append((coherence.cross / coherence.simulated)[5:])
+        powers.append((coherence.squared**exponent)[5:])
+    assert np.mean(slopes) == pytest.approx(np.mean(powers), rel=0.03)
+
+
+def test_noise_variance_whitens_red_noise() -> None:
+    squares = []
+    for seed in range(10):
+        residual = spectra.to_cosine(_red(seed))[:2000]
+        squares.append(residual**2 / spectra.noise_variance(residual, None, 0))
+    mean = np.mean(squares, axis=0)
+    assert np.mean(mean) == pytest.approx(1.0, abs=0.06)
+    assert np.mean(mean[10:100]) == pytest.approx(1.0, abs=0.15)
+
+
+def test_noise_variance_ignores_a_few_large_coefficients() -> None:
+    residual = np.random.default_rng(3).standard_normal(2000)
+    clean = spectra.noise_variance(residual, None, 0)
+    residual[[300, 700, 1500]] = 60.0
+    assert spectra.noise_variance(residual, None, 0) == pytest.approx(clean, rel=0.1)
