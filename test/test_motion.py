@@ -10,6 +10,11 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from wind_sensors.errors import UserError
 from wind_sensors.motion import frames, relative_wind, rotations
+from wind_sensors.motion.downwash import (
+    hover_induced_velocity,
+    rotor_downwash,
+    share_on_axis,
+)
 from wind_sensors.motion.platform_errors import reported_motion, true_motion
 from wind_sensors.motion.platform_track import Motion, PlatformTrack, TrackLimits, shifted
 from wind_sensors.station.model import Clock, Downwash, HeadingDeviation, Platform
@@ -297,12 +302,48 @@ def test_a_late_clock_shows_an_earlier_state():
 
 @given(st.floats(0.5, 10.0), st.floats(0.0, 20.0))
 def test_downwash_obeys_momentum_theory(hover, airspeed):
-    added = relative_wind.rotor_downwash(
+    added = rotor_downwash(
         Downwash(induced_velocity=hover, wake_skew=0.5), np.array([[-airspeed, 0.0, 0.0]])
     )[0]
     induced = -added[2]
     assert induced * np.hypot(airspeed, induced) == pytest.approx(hover**2, rel=1e-6)
     assert added[0] == pytest.approx(-0.5 * induced * airspeed / hover)
+
+
+@given(st.floats(1.0, 100.0), st.floats(0.05, 2.0), st.floats(0.4, 0.9), st.floats(0.05, 1.0))
+def test_thrust_and_the_power_it_takes_give_the_same_inflow(thrust, area, merit, share):
+    by_thrust = hover_induced_velocity(
+        Downwash(thrust=thrust, disc_area=area, sensor_share=share)
+    )
+    # Momentum through the discs: T = rho A v (2 v), and the power is T v over the merit.
+    in_disc = by_thrust / share
+    assert 2.0 * 1.225 * area * in_disc**2 == pytest.approx(thrust)
+    by_power = hover_induced_velocity(
+        Downwash(
+            hover_power=thrust * in_disc / merit,
+            figure_of_merit=merit,
+            disc_area=area,
+            sensor_share=share,
+        )
+    )
+    assert by_power == pytest.approx(by_thrust)
+
+
+def test_a_column_of_ring_vortices_draws_air_as_biot_and_savart_say():
+    radius, height = 0.3, 0.25
+    below = np.linspace(0.0, 400.0, 4_000_001)
+    ring = radius**2 / (2.0 * (radius**2 + (height + below) ** 2) ** 1.5)
+    in_disc = radius**2 / (2.0 * (radius**2 + below**2) ** 1.5)
+    expected = np.trapezoid(ring, below) / np.trapezoid(in_disc, below)
+    assert share_on_axis(height, radius) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"thrust": 10.0}, {"thrust": 10.0, "hover_power": 50.0, "disc_area": 1.0}]
+)
+def test_an_inflow_without_its_rotors_is_refused(wrong):
+    with pytest.raises(ValueError, match=r"disc_area|not both"):
+        Downwash(**wrong)
 
 
 def test_felt_gravity_is_the_plumb_line_of_a_swing():

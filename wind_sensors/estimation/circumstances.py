@@ -8,8 +8,9 @@ import numpy.typing as npt
 from wind_sensors.estimation import forward
 from wind_sensors.estimation.intake import Block
 from wind_sensors.motion import Motion, PlatformTrack, TrackLimits, rotations, true_motion
-from wind_sensors.motion.relative_wind import rotor_downwash, sensor_rotation, sensor_velocity
-from wind_sensors.station.model import Clock, Platform, Station
+from wind_sensors.motion.downwash import rotor_downwash
+from wind_sensors.motion.relative_wind import sensor_rotation, sensor_velocity
+from wind_sensors.station.model import Clock, Downwash, Platform, Station
 from wind_sensors.station.signals import PlatformStates
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,9 +27,6 @@ STANDARD_TEMPERATURE = 15.0
 STANDARD_GRAVITY = 9.80665
 """[m/s^2]"""
 _KEPT_STATES = 50
-_GUESSWORK_VELOCITY = 5.0
-_GUESSWORK_ATTITUDE = 1.0
-"""Standard deviations [m/s, rad] where the platform's motion would be guesswork."""
 
 
 class CircumstanceSource:
@@ -45,7 +43,6 @@ class CircumstanceSource:
         self._platform_times: TimeArray = np.empty(0, dtype=np.int64)
         self._temperature = np.nan
         self._pressure = np.nan
-        self.guesswork = 0
         self.station = station
         heading = float(np.radians(station.sensor_heading_deg))
         turn = rotations.matrix(rotations.from_roll_pitch_yaw(0.0, 0.0, heading))
@@ -90,7 +87,7 @@ class CircumstanceSource:
                 needs it.
 
         Returns:
-            Shape (n, 22), see `forward`.
+            Shape (n, 23), see `forward`.
         """
         rows = np.zeros((times.size, forward.CIRCUMSTANCES))
         self._air(rows)
@@ -102,8 +99,7 @@ class CircumstanceSource:
             self._moving(rows, times, platform, wind)
         else:
             rows[:, 3:12] = np.eye(3).ravel()
-            rows[:, forward.VELOCITY_VARIANCE] = _GUESSWORK_VELOCITY**2
-            rows[:, forward.ATTITUDE_VARIANCE] = _GUESSWORK_ATTITUDE**2
+            rows[:, forward.VELOCITY_VARIANCE] = np.inf
         return rows
 
     def _moving(
@@ -128,7 +124,7 @@ class CircumstanceSource:
         rotation = sensor_rotation(platform)
         arm = self._lever_arm(platform, rotation)
         moving = platform.velocity_share * sensor_velocity(motion, arm)
-        if platform.downwash.induced_velocity != 0.0:
+        if platform.downwash != Downwash():
             felt = np.einsum("nji,j->ni", motion.to_earth, wind) - moving
             moving = moving - rotor_downwash(platform.downwash, felt)
         rows[:, 0:3] = np.einsum("nij,nj->ni", motion.to_earth, moving)
@@ -142,14 +138,17 @@ class CircumstanceSource:
             rows[:, forward.MOUNT_GRAVITY_X] = felt_gravity[:, 0]
             rows[:, forward.MOUNT_GRAVITY_Y] = felt_gravity[:, 1]
             rows[:, forward.MOUNT_GRAVITY_Z] = felt_gravity[:, 2]
-        guess = ~sample.known
-        self.guesswork += int(np.count_nonzero(guess))
+        mounting = np.radians(platform.mounting_noise_deg) ** 2
+        swinging = np.radians(platform.angular_rate_noise_deg) ** 2 * float(arm @ arm) * 2.0 / 3.0
         rows[:, forward.VELOCITY_VARIANCE] = np.where(
-            guess, _GUESSWORK_VELOCITY**2, sample.velocity_variance
+            sample.known, sample.velocity_variance + swinging, np.inf
         )
-        rows[:, forward.ATTITUDE_VARIANCE] = np.where(
-            guess, _GUESSWORK_ATTITUDE**2, sample.attitude_variance
-        )
+        rows[:, forward.MOUNTING_VARIANCE] = mounting
+        if platform.velocity_axes == "earth":
+            # A velocity measured in the earth frame does not turn with the attitude's error.
+            rows[:, forward.MOUNTING_VARIANCE] += sample.attitude_variance
+        else:
+            rows[:, forward.ATTITUDE_VARIANCE] = sample.attitude_variance
 
     def _lever_arm(self, platform: Platform, rotation: FloatArray) -> FloatArray:
         """The first instrument's place in platform axes [m]; the others stand close to it."""
@@ -191,22 +190,29 @@ def replace_clock(platform: Platform) -> Platform:
 def with_mount_covariance(
     covariance: FloatArray, wind: FloatArray, rows: FloatArray
 ) -> FloatArray:
-    """Add what attitude and velocity of the mount contribute to the earth wind's covariance.
+    """Add what attitude, velocity and mounting contribute to the earth wind's covariance.
 
-    The earth wind is R (apparent + velocity) with both vectors measured on the platform, so that a
-    small rotation of R turns it as a whole.
+    The earth wind is R (apparent + velocity). With both vectors measured on the platform a small
+    rotation of R turns it as a whole; the mounting, and the attitude where the velocity comes in
+    earth axes, turn the apparent wind alone.
 
     Args:
         covariance: [m^2/s^2], shape (n, 3, 3).
         wind: ENU [m/s], shape (n, 3).
-        rows: Circumstances, shape (n, 22).
+        rows: Circumstances, shape (n, 23).
 
     Returns:
-        Shape (n, 3, 3).
+        Shape (n, 3, 3); nan where the mount's motion is not known.
     """
-    velocity = rows[:, forward.VELOCITY_VARIANCE][:, np.newaxis, np.newaxis]
-    attitude = rows[:, forward.ATTITUDE_VARIANCE][:, np.newaxis, np.newaxis]
-    size2 = np.einsum("ni,ni->n", wind, wind)[:, np.newaxis, np.newaxis]
-    outer = wind[:, :, np.newaxis] * wind[:, np.newaxis, :]
-    total: FloatArray = covariance + velocity * np.eye(3) + attitude * (size2 * np.eye(3) - outer)
+    velocity = rows[:, forward.VELOCITY_VARIANCE]
+    known = np.isfinite(velocity)
+    total = covariance + np.where(known, velocity, 0.0)[:, np.newaxis, np.newaxis] * np.eye(3)
+    for vector, column in (
+        (wind, forward.ATTITUDE_VARIANCE),
+        (wind - rows[:, :3], forward.MOUNTING_VARIANCE),
+    ):
+        size2 = np.einsum("ni,ni->n", vector, vector)[:, np.newaxis, np.newaxis]
+        outer = vector[:, :, np.newaxis] * vector[:, np.newaxis, :]
+        total = total + rows[:, column][:, np.newaxis, np.newaxis] * (size2 * np.eye(3) - outer)
+    total[~known] = np.nan
     return total

@@ -70,6 +70,20 @@ def no_estimates() -> Estimates:
     )
 
 
+def trusted(estimates: Estimates) -> Estimates:
+    """The estimates whose covariance is known: the others would be guesswork."""
+    known = np.isfinite(estimates.covariance).all(axis=(1, 2))
+    if known.all():
+        return estimates
+    return Estimates(
+        estimates.time[known],
+        estimates.velocity[known],
+        estimates.covariance[known],
+        estimates.apparent[known],
+        estimates.apparent_covariance[known],
+    )
+
+
 def joined(parts: list[Estimates]) -> Estimates:
     """Estimates of successive blocks as one."""
     if len(parts) == 1:

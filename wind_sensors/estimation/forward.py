@@ -37,10 +37,12 @@ ATTITUDE_VARIANCE = 18
 MOUNT_ROLL_RATE = 19
 MOUNT_PITCH_RATE = 20
 MOUNT_GRAVITY_Z = 21
-CIRCUMSTANCES = 22
+MOUNTING_VARIANCE = 22
+CIRCUMSTANCES = 23
 """Columns of the circumstances of an instant: velocity of the sensor (ENU), rotation of the sensor
-frame into ENU (by rows), yaw rate, gravity felt along x and y, air, variances of the mount, roll
-and pitch rate, gravity felt along z."""
+frame into ENU (by rows), yaw rate, gravity felt along x and y, air, variances of the mount's
+velocity and of rotations of the whole wind, roll and pitch rate, gravity felt along z, variance of
+rotations of the apparent wind alone. The variances are infinite where nothing is known."""
 
 
 class Instruments(NamedTuple):

@@ -108,6 +108,31 @@ def clock_health(intake: Intake, unknown: dict[str, int]) -> HealthItem:
     return HealthItem("clock", HealthLevel.OK, "Stamps run forward.", values)
 
 
+def motion_health(refused: int, refusing: bool) -> HealthItem:
+    """Whether the carrier's motion is known well enough for a wind in the earth frame.
+
+    Args:
+        refused: Estimates that would have been guesswork.
+        refusing: Whether the latest was one of them.
+    """
+    values = {"refused estimates": str(refused)}
+    if refusing:
+        return HealthItem(
+            "motion",
+            HealthLevel.ERROR,
+            "The platform's motion is not known: no wind is published until it is heard of again.",
+            values,
+        )
+    if refused:
+        return HealthItem(
+            "motion",
+            HealthLevel.WARN,
+            f"{refused} estimates were left out: the platform had not been heard of around them.",
+            values,
+        )
+    return HealthItem("motion", HealthLevel.OK, "The platform's motion is known.", values)
+
+
 def bias_health(window: WindowStatistics) -> HealthItem:
     """The biases of the latest window, one key each, relative to the mean speed."""
     values = {

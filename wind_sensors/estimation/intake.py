@@ -223,10 +223,15 @@ class Intake:
             for name, time, value in early:
                 self._keep(name, time, value)
         out = []
-        last = self.watermark - wait - (0 if finish else self._look_ahead)
-        while self.released + self._block <= last or (finish and self.released <= last):
+        while self._is_complete(self.released + self._block, wait, finish):
             out.append(self._release(self.released + self._block))
         return out
+
+    def _is_complete(self, stop: int, wait: int, finish: bool) -> bool:
+        """Whether the block up to `stop` can be released; what is left with `finish`."""
+        if finish and self.released <= self.watermark:
+            return True
+        return stop <= self.watermark - wait - self._look_ahead
 
     def _release(self, stop: int) -> Block:
         start = self.released

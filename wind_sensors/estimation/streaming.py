@@ -12,8 +12,13 @@ import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.estimation.constants import axes_of, is_array, rotors_of
-from wind_sensors.estimation.core import Core, Estimates, joined
-from wind_sensors.estimation.health import bias_health, clock_health, input_health
+from wind_sensors.estimation.core import Core, Estimates, joined, trusted
+from wind_sensors.estimation.health import (
+    bias_health,
+    clock_health,
+    input_health,
+    motion_health,
+)
 from wind_sensors.estimation.intake import (
     PLATFORM,
     PRESSURE,
@@ -36,8 +41,9 @@ from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station
 FloatArray = npt.NDArray[np.float64]
 
 _PLATFORM, _TEMPERATURE, _PRESSURE = "platform", "temperature", "pressure"
-_LOOK_AHEAD_NS = 100_000_000
-"""Of the platform's motion, so that it can be interpolated at the end of a block."""
+_LOOK_AHEAD_NS = (100_000_000, 2_000_000_000)
+"""Of the platform's motion, so that it can be interpolated at the end of a block; at most this long
+is a slow source waited for."""
 
 
 def _inputs(station: Station) -> dict[str, tuple[int, int, Correction | None]]:
@@ -107,6 +113,9 @@ class StreamingEstimator:
         self._unknown: dict[str, int] = {}
         self._last_health: list[HealthItem] = []
         self._latest: WindowStatistics | None = None
+        self._refused = 0
+        self._refusing = False
+        self._refused_since = 0
 
     def _new_intake(self) -> Intake:
         s = self.settings
@@ -115,7 +124,7 @@ class StreamingEstimator:
             self._inputs,
             self._block,
             round(wait * 1e9),
-            _LOOK_AHEAD_NS if self.station.platform is not None else 0,
+            _LOOK_AHEAD_NS if self.station.platform is not None else (0, 0),
             round(s.gap_time * 1e9),
             round(s.jump_time * 1e9),
         )
@@ -193,13 +202,24 @@ class StreamingEstimator:
             core = self._core
             if core is None:
                 core = self._core = self._new_core()
-            estimates = core.process(block)
-            self._keep(estimates)
+            estimates = self._kept(core.process(block))
             self._close(self._windows.take(block, estimates, core.small_scales()))
 
-    def _keep(self, estimates: Estimates) -> None:
+    def _kept(self, estimates: Estimates) -> Estimates:
+        """Keep what is no guesswork, and count the rest."""
+        known = trusted(estimates)
         if estimates.time.size:
-            self._estimates.append(estimates)
+            self._refused += estimates.time.size - known.time.size
+            latest = int(estimates.time[-1])
+            if known.time.size:
+                self._refused_since = int(known.time[-1]) if known.time[-1] < latest else 0
+            elif not self._refused_since:
+                self._refused_since = int(estimates.time[0])
+            silence = latest - self._refused_since if self._refused_since else 0
+            self._refusing = silence > self.settings.gap_time * 1e9
+        if known.time.size:
+            self._estimates.append(known)
+        return known
 
     def _close(self, windows: list[WindowStatistics]) -> None:
         if windows:
@@ -218,8 +238,7 @@ class StreamingEstimator:
     def _finish(self) -> None:
         self._process(self._intake.blocks(finish=True))
         if self._core is not None:
-            estimates = self._core.finish()
-            self._keep(estimates)
+            estimates = self._kept(self._core.finish())
             self._close(self._windows.finish(estimates, self._core.small_scales()))
         self._last_health = self._core.health() if self._core is not None else []
         self._core = None
@@ -237,6 +256,9 @@ class StreamingEstimator:
         self._estimates.clear()
         self._finished.clear()
         self._latest = None
+        self._refused = 0
+        self._refusing = False
+        self._refused_since = 0
         self._last_health = []
         self._unknown.clear()
 
@@ -269,6 +291,8 @@ class StreamingEstimator:
         """State of every input, of the clock and of the estimate."""
         items = input_health(self._intake, self.station, self.settings)
         items.append(clock_health(self._intake, self._unknown))
+        if self.station.platform is not None:
+            items.append(motion_health(self._refused, self._refusing))
         core = self._core
         items += core.health() if core is not None else self._last_health
         if self._latest is not None:

@@ -90,8 +90,8 @@ class PlatformTrack:
     """A carrier's states as a function of time.
 
     Between states the attitude follows the great circle and everything else a straight line.
-    Beyond them the platform keeps its turning rate and its velocity, and the variances grow with
-    the accelerations that may have happened unseen.
+    Beyond them the platform keeps its turning rate and its velocity as long as extrapolation is
+    allowed, and the variances grow with the accelerations that may have happened unseen.
 
     Args:
         states: States in any order; doubles in time are dropped.
@@ -154,7 +154,8 @@ class PlatformTrack:
             (wanted - self._time[0]) * 1e-9,
             np.where(wanted > self._time[-1], (wanted - self._time[-1]) * 1e-9, 0.0),
         )
-        motion = _carried_on(motion, beyond)
+        longest = self.limits.longest_extrapolation
+        motion = _carried_on(motion, np.clip(beyond, -longest, longest))
         bulge: FloatArray = inside * (1.0 - inside) * span * span
         return self._judged(motion, beyond, bulge, span)
 

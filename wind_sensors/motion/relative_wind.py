@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from wind_sensors.motion import rotations
 from wind_sensors.motion.platform_track import Motion
-from wind_sensors.station.model import Downwash, Platform
+from wind_sensors.station.model import Platform
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -132,34 +132,6 @@ def earth_wind_covariance(
     total = total + spread(arm, rate_variance)
     in_earth: FloatArray = np.einsum("nij,njk,nlk->nil", motion.to_earth, total, motion.to_earth)
     return in_earth
-
-
-def rotor_downwash(downwash: Downwash, apparent: FloatArray) -> FloatArray:
-    """Flow that a multirotor's rotors add at the sensor, in platform axes [m/s].
-
-    Glauert's momentum theory in forward flight: the induced velocity v solves
-    v sqrt(V^2 + v^2) = v_h^2 with V the airspeed across the rotor axis and v_h the value at hover.
-    It points down; a skewed wake leans with the flow by `wake_skew` times V/v_h.
-
-    Args:
-        downwash: Its parameters.
-        apparent: Wind that the platform feels without its rotors, in platform axes, shape (n, 3).
-
-    Returns:
-        Shape (n, 3).
-    """
-    hover = downwash.induced_velocity
-    added = np.zeros_like(apparent)
-    if hover == 0.0:
-        return added
-    squared = np.square(apparent[:, 0]) + np.square(apparent[:, 1])
-    half = 0.5 * squared / hover**2
-    induced = hover * np.sqrt(np.sqrt(np.square(half) + 1.0) - half)
-    lean = downwash.wake_skew * induced / abs(hover)
-    added[:, 0] = lean * apparent[:, 0]
-    added[:, 1] = lean * apparent[:, 1]
-    added[:, 2] = -induced
-    return added
 
 
 def felt_gravity(motion: Motion, lever_arm: npt.ArrayLike, dt: float) -> FloatArray:

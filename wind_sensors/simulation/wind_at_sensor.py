@@ -13,10 +13,18 @@ import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
 from wind_sensors.motion import relative_wind, rotations
+from wind_sensors.motion.downwash import rotor_downwash
 from wind_sensors.motion.platform_errors import true_motion
 from wind_sensors.motion.platform_track import Motion
 from wind_sensors.simulation.drive import Drive
-from wind_sensors.station.model import Angle, FlowDistortion, Instrument, Platform, Station
+from wind_sensors.station.model import (
+    Angle,
+    Downwash,
+    FlowDistortion,
+    Instrument,
+    Platform,
+    Station,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -139,8 +147,8 @@ class WindAtSensors:
             if platform.velocity_share != 0.0:
                 moving = relative_wind.sensor_velocity(motion, self._lever_arm(position))
                 felt = felt - platform.velocity_share * moving
-            if platform.downwash.induced_velocity != 0.0:
-                felt = felt + relative_wind.rotor_downwash(platform.downwash, felt)
+            if platform.downwash != Downwash():
+                felt = felt + rotor_downwash(platform.downwash, felt)
             self._winds[key] = felt
         return self._winds[key]
 
