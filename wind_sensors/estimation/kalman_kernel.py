@@ -23,6 +23,8 @@ from wind_sensors.estimation.turbulence_process import WIND_STATES
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
+_STOPPABLE = 16.0
+"""A rotor whose y^2 is less than this times its friction may stop at once [1]."""
 _LOSS_NOTICED = 0.002
 """Share of lost edges from which silence no longer means that the rotor waits."""
 _TOO_EARLY = 0.4
@@ -79,7 +81,7 @@ def run(
         index: Vane or rotor; running number of an output.
         value: Angle of a reading or of the rotor [rad]; nan for an edge.
         extra: Additional variance of a reading [rad^2].
-        circumstances: Mount and air at the events, shape (n, 22).
+        circumstances: Mount and air at the events, shape (n, 23).
         stop: End of the last block [ns].
         block: Length of a block [ns].
         lag: Of the smoother [ns].
@@ -155,6 +157,24 @@ def run(
 
 
 @compiled
+def _must_have_turned(f: FilterState, s: Instruments, r: int) -> float:
+    """Angle that rotor r has turned since its last edge whatever the wind did [rad].
+
+    The wind brakes at most by y^2/(4 l0), with half the rotor's own speed; a longer silence is an
+    outage and says nothing of the wind. 0 for a rotor that friction may have stopped.
+    """
+    if f.slot_interval[r] <= 0.0:
+        return 0.0
+    length = s.rotor[r, 3] * s.rotor[r, 12]
+    y = 2.0 * math.pi * s.rotor[r, 1] / (f.slots[r] * f.slot_interval[r])
+    friction = s.rotor[r, 9] + s.rotor[r, 2] * s.rotor[r, 2]
+    if y * y < _STOPPABLE * friction:
+        return 0.0
+    since = (f.clock[0] - f.last_edge[r]) * 1e-9
+    return float(4.0 * length / s.rotor[r, 1] * math.log(1.0 + 0.25 * y * since / length))
+
+
+@compiled
 def _listen(f: FilterState, s: Instruments, ring: Ring, at: int, rotors: int, which: int) -> None:
     """No edge until now: at output instants one rotor in turn may not have passed its next edge."""
     if rotors == 0:
@@ -165,4 +185,6 @@ def _listen(f: FilterState, s: Instruments, ring: Ring, at: int, rotors: int, wh
     lost = f.tally[r, 1] / max(f.tally[r, 0], 1)
     allowance = 1.2 if lost < _LOSS_NOTICED else 4.0
     width = 2.0 * math.pi / f.slots[r]
+    if _must_have_turned(f, s, r) > (allowance + 1.0) * width:
+        return
     correct_by_silence(f, ring, at, r, (f.edge_count[r] + allowance) * width)
