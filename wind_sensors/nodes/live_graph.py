@@ -1,0 +1,184 @@
+"""A simulated station and its estimator as processes of their own, recorded over DDS."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import wind_sensors
+from wind_sensors.errors import UserError
+from wind_sensors.nodes import execution
+from wind_sensors.recordings import load_station
+from wind_sensors.simulation.run import recording_start
+
+if TYPE_CHECKING:
+    from wind_sensors.nodes.recorder import RecorderNode
+
+_DOMAIN = 40
+_DEEP = 100_000
+_PATIENCE = 300.0
+"""Longest wait for the first message: kernels may have to be compiled first [s]."""
+
+_QUIET = 2.5
+"""Silence that ends the recording [s]."""
+
+_BURST = {f"qos_overrides./{t}.publisher.depth": 1000 for t in ("wind", "wind/apparent")}
+
+
+@dataclass(frozen=True)
+class LiveRun:
+    """What a live run was.
+
+    Attributes:
+        wall_seconds: From the first message to the last.
+        counts: Messages recorded, by topic.
+        exit_codes: Of the processes, by node.
+    """
+
+    wall_seconds: float
+    counts: dict[str, int]
+    exit_codes: dict[str, int]
+
+
+@dataclass
+class _Watch:
+    """Sees the messages come and notices when no more do."""
+
+    processes: Mapping[str, subprocess.Popen[bytes]]
+    begin: float = field(default_factory=time.monotonic)
+    first: float | None = None
+    last: float = 0.0
+    messages: int = 0
+    over: bool = False
+
+    def is_over(self, counts: Mapping[str, int]) -> bool:
+        """Whether everything has arrived.
+
+        Raises:
+            UserError: A process ended by itself, or nothing ever came.
+        """
+        now = time.monotonic()
+        messages = sum(n for topic, n in counts.items() if topic != "/diagnostics")
+        if messages != self.messages:
+            self.messages, self.last = messages, now
+            self.first = self.first or now
+        for name, process in self.processes.items():
+            status = process.poll()
+            if status:
+                raise UserError(f"{name} has ended with status {status}.", "live graph")
+        if self.first is None and now - self.begin > _PATIENCE:
+            raise UserError("no message has arrived.", "live graph", "See the nodes' messages.")
+        self.over = self.first is not None and now - self.last > _QUIET
+        return self.over
+
+
+def run_live(
+    station_file: str,
+    simulation: Mapping[str, object],
+    estimation: Mapping[str, object],
+    folder: Path,
+    progress: Callable[[int, float], None],
+) -> LiveRun:
+    """Run simulator and estimator as processes and record everything they publish.
+
+    Args:
+        station_file: Station file with a cup, a vane and the recording's start.
+        simulation: Parameters of the simulator, with `duration` and `speed`.
+        estimation: Parameters of the estimator.
+        folder: Recording to write; replaced if it is one.
+        progress: Called with the number of messages recorded so far and the simulated time [s].
+
+    Raises:
+        UserError: There is no rclpy, or a node failed.
+    """
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ["ROS_DOMAIN_ID"] = str(_DOMAIN + os.getpid() % 60)
+    station = load_station(station_file)
+    begin = recording_start(station)
+    common = {"station": station_file}
+    estimator = _start(
+        "cup_vane_node",
+        {
+            **common,
+            **estimation,
+            "use_sim_time": True,
+            "reliable_inputs": True,
+            "input_depth": _DEEP,
+            **_BURST,
+        },
+    )
+    simulator = _start(
+        "sim_node",
+        {
+            **common,
+            **simulation,
+            "publish_clock": True,
+            "publish_truth": True,
+            "wait_for_subscribers": 2,
+            "output_depth": _DEEP,
+        },
+    )
+    processes = {"cup_vane_node": estimator, "sim_node": simulator}
+    watch = _Watch(processes)
+    made: list[RecorderNode] = []
+
+    def build() -> list[RecorderNode]:
+        from rclpy.parameter import Parameter
+
+        from wind_sensors.nodes.recorder import RecorderNode
+        from wind_sensors.nodes.topics import station_topics
+
+        made.append(
+            RecorderNode(
+                folder,
+                station_topics(station),
+                station,
+                force=True,
+                parameter_overrides=[Parameter("use_sim_time", value=True)],
+            )
+        )
+        return made
+
+    def until() -> bool:
+        elapsed = made[0].get_clock().now().nanoseconds - begin
+        progress(watch.messages, max(elapsed * 1e-9, 0.0))
+        return watch.is_over(made[0].counts)
+
+    try:
+        execution.run(build, [], until=until, last=False)
+    finally:
+        codes = {name: _stop(process) for name, process in processes.items()}
+    if not watch.over:
+        raise KeyboardInterrupt
+    return LiveRun(watch.last - (watch.first or watch.last), dict(made[0].counts), codes)
+
+
+def _start(node: str, parameters: Mapping[str, object]) -> subprocess.Popen[bytes]:
+    code = f"import sys; from wind_sensors.nodes.{node} import main; sys.exit(main())"
+    arguments = ["--ros-args", "--log-level", "warn"]
+    for name, value in parameters.items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        arguments += ["-p", f"{name}:={text}"]
+    package_parent = str(Path(wind_sensors.__file__).resolve().parent.parent)
+    paths = [package_parent, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+    )
+
+
+def _stop(process: subprocess.Popen[bytes]) -> int:
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+    try:
+        return process.wait(timeout=10.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
