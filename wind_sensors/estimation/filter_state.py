@@ -8,7 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.forward import CIRCUMSTANCES
-from wind_sensors.estimation.turbulence_process import LEVELS, PAIRS, WIND_STATES
+from wind_sensors.estimation.turbulence_process import (
+    LEVELS,
+    PAIRS,
+    VERTICAL_CONSTANTS,
+    WIND_STATES,
+)
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -28,8 +33,8 @@ class FilterState(NamedTuple):
         covariance: Shape (n, n).
         clock: Time of the state [ns]; time up to which estimates have been delivered [ns]; steps
             in the ring since the start; blocks since the start.
-        circumstances: At the time of the state, shape (22,).
-        levels: Turbulence levels, shape (4,), see `turbulence_process`.
+        circumstances: At the time of the state, shape (23,).
+        levels: Turbulence levels, shape (5,), see `turbulence_process`.
         level_information: Running expected scores of the levels.
         edge_variance: Variance of an edge's place [slots^2], one per rotor.
         reading_variance: Of a vane's reading [rad^2], one per vane.
@@ -46,7 +51,7 @@ class FilterState(NamedTuple):
         tally: By rotor: accepted, lost, extra, wind found again; shape (rotors, 4).
         innovation: Running sum of squared normalised innovations and their number (rotors, then
             vanes), shape (rotors + vanes, 2).
-        height: Above the ground [m], shape (1,).
+        height: Above the ground [m]; 1 where the station measures the vertical wind, shape (2,).
         outliers: Readings and edges far outside their expected scatter (rotors, then vanes).
     """
 
@@ -90,9 +95,10 @@ class Ring(NamedTuple):
         decay: exp(-dt/tau) of the wind states, shape (c, w).
         transition: Rows of F of the instruments' states, shape (c, i, n).
         noise_gain: Derivative of the instruments' states by the new wind, shape (c, i, 3).
-        noise: Variance added to each wind state along and across, shape (c, pairs, 2).
+        noise: Variance added to each pair along and across, then to the vertical processes (first
+            column), shape (c, pairs + vertical, 2).
         heading: Unit vector of the mean wind, shape (c, 2).
-        circumstances: Shape (c, 22).
+        circumstances: Shape (c, 23).
         mean, covariance: After the step, at output instants, shape (c, n) and (c, n, n).
     """
 
@@ -141,7 +147,7 @@ def empty_filter(rotors: int, vanes: int) -> FilterState:
         tally=np.zeros((rotors, 4), dtype=np.int64),
         innovation=np.zeros((rotors + vanes, 2)),
         outliers=np.zeros(rotors + vanes, dtype=np.int64),
-        height=np.array([10.0]),
+        height=np.array([10.0, 0.0]),
     )
 
 
@@ -162,7 +168,7 @@ def empty_ring(capacity: int, rotors: int, vanes: int) -> Ring:
         decay=np.zeros((capacity, WIND_STATES)),
         transition=np.zeros((capacity, instruments, n)),
         noise_gain=np.zeros((capacity, instruments, 3)),
-        noise=np.zeros((capacity, PAIRS, 2)),
+        noise=np.zeros((capacity, PAIRS + len(VERTICAL_CONSTANTS), 2)),
         heading=np.zeros((capacity, 2)),
         circumstances=np.zeros((capacity, CIRCUMSTANCES)),
         mean=np.zeros((capacity, n)),

@@ -23,7 +23,7 @@ from wind_sensors.estimation.forward import (
     MOUNT_ROLL_RATE,
     MOUNT_YAW_RATE,
 )
-from wind_sensors.estimation.history import History, NoseTrack
+from wind_sensors.estimation.history import History, NoseTrack, RotorTrack
 from wind_sensors.estimation.intake import Block
 from wind_sensors.estimation.naive import earth_estimates
 from wind_sensors.estimation.outputs import HealthItem
@@ -169,6 +169,75 @@ def wind_heading_from_motion(
     return phi - p.aerodynamic_offset - math.asin(min(max(deviation, -1.0), 1.0))
 
 
+def rotor_motion(
+    track: RotorTrack, time: int, width: float, heard_until: int, stop_ns: int
+) -> tuple[float, float, float, float, float]:
+    """`local_parabola` of a rotor's turned angle; one that has stopped does not move.
+
+    Args:
+        track: Its edges.
+        time: The instant [ns].
+        width: Standard deviation of the weights [s].
+        heard_until: Time up to which an edge would be known [ns].
+        stop_ns: A rotor without an edge for this long has stopped [ns].
+    """
+    edges = track.time
+    if edges.size < 3:
+        return 0.0, 0.0, 0.0, 1.0, 1.0
+    after = int(np.searchsorted(edges, time))
+    since = time - edges[after - 1] if after > 0 else 0
+    until = edges[after] - time if after < edges.size else heard_until - time
+    if since + until > stop_ns:
+        return 0.0, 0.0, 0.0, 1.0, 1.0
+    return local_parabola(edges, track.angle, time, width)
+
+
+class ScaleFollower:
+    """Inertial range from the structure function of the estimates at one period of the bandwidth.
+
+    Args:
+        settings: `bandwidth`, `output_rate`, `adaptation_time`.
+    """
+
+    def __init__(self, settings: EstimatorSettings) -> None:
+        self._settings = settings
+        self._structure = np.zeros(2)
+        self._recent: list[FloatArray] = []
+
+    @property
+    def unresolved(self) -> float:
+        """Variance of a component above the bandwidth, for level 1."""
+        return float(_VARIANCE_ABOVE * self._settings.bandwidth ** (-2.0 / 3.0))
+
+    def follow(self, velocity: FloatArray) -> None:
+        """Take new estimates [m/s], shape (n, 3)."""
+        lag = max(round(self._settings.output_rate / self._settings.bandwidth), 1)
+        self._recent.append(velocity[:, :2])
+        joined = np.concatenate(self._recent)
+        if joined.shape[0] > lag:
+            steps = np.square(joined[lag:] - joined[:-lag]).mean()
+            share = velocity.shape[0] / self._settings.output_rate / self._settings.adaptation_time
+            keep = max(1.0 - share, 0.0)
+            self._structure[0] = keep * self._structure[0] + share * steps
+            self._structure[1] = keep * self._structure[1] + share
+        self._recent = [joined[-lag:]]
+
+    def level(self) -> float:
+        """D(t) = level t^(2/3), the loss above the bandwidth allowed for."""
+        if self._structure[1] <= 0.0:
+            return 0.5
+        seen = self._structure[0] / self._structure[1]
+        lag = 1.0 / self._settings.bandwidth
+        return float(seen / (lag ** (2.0 / 3.0) * (1.0 - 2.0 * _VARIANCE_ABOVE)))
+
+    def small_scales(self) -> SmallScales | None:
+        """The level of both components; None before there were estimates."""
+        if self._structure[1] <= 0.0:
+            return None
+        level = self.level()
+        return SmallScales(level, level)
+
+
 class InverseCore:
     """The instruments' equations solved for the wind.
 
@@ -189,8 +258,7 @@ class InverseCore:
         self._fixed = getattr(self._history.rotor, "mounted_on", "") == ""
         self._next = 0
         self._stop = 0
-        self._structure = np.zeros(2)
-        self._recent: list[FloatArray] = []
+        self._scales = ScaleFollower(settings)
 
     def process(self, block: Block) -> Estimates:
         """Take a block; estimates whose fit needs no later message."""
@@ -215,12 +283,13 @@ class InverseCore:
         n = times.size
         speed, heading = np.empty(n), np.empty(n)
         along, across = np.empty(n), np.empty(n)
-        missing = _VARIANCE_ABOVE * self._settings.bandwidth ** (-2.0 / 3.0)
-        level = self._level()
+        missing = self._scales.unresolved
+        level = self._scales.level()
         slot = 2.0 * np.pi / h.rotor.pulses_per_revolution
+        stop_ns = round(self._settings.stop_time * 1e9)
         for k in range(n):
             row = rows[k]
-            turned = self._rotor_motion(int(times[k]))
+            turned = rotor_motion(h.edges, int(times[k]), self._width, self._stop, stop_ns)
             nose = local_parabola(h.nose.time, h.nose.angle, int(times[k]), self._width)
             y = max(turned[1] * self._rotor.calibration_distance, 0.0)
             y_rate = turned[2] * self._rotor.calibration_distance
@@ -242,7 +311,7 @@ class InverseCore:
         if h.elevation is not None and h.elevation.time.size >= 3:
             lift, vertical = self._lift(h.elevation, times, rows, speed, heading), across
         estimates = earth_estimates(times, speed, heading, along, across, vertical, rows, lift)
-        self._follow(estimates.velocity)
+        self._scales.follow(estimates.velocity)
         return estimates
 
     def _lift(
@@ -267,44 +336,9 @@ class InverseCore:
             out[k] = speed[k] * math.tan(rises)
         return out
 
-    def _rotor_motion(self, time: int) -> tuple[float, float, float, float, float]:
-        """Angle, rate and acceleration of the rotor; one that has stopped does not move."""
-        edges = self._history.edges.time
-        stop_ns = self._settings.stop_time * 1e9
-        after = int(np.searchsorted(edges, time))
-        since = time - edges[after - 1] if after > 0 else 0
-        until = edges[after] - time if after < edges.size else self._stop - time
-        if since + until > stop_ns:
-            return 0.0, 0.0, 0.0, 1.0, 1.0
-        return local_parabola(edges, self._history.edges.angle, time, self._width)
-
-    def _follow(self, velocity: FloatArray) -> None:
-        """Running structure function at one period of the bandwidth."""
-        lag = max(round(self._settings.output_rate / self._settings.bandwidth), 1)
-        self._recent.append(velocity[:, :2])
-        joined = np.concatenate(self._recent)
-        if joined.shape[0] > lag:
-            steps = np.square(joined[lag:] - joined[:-lag]).mean()
-            share = velocity.shape[0] / self._settings.output_rate / self._settings.adaptation_time
-            keep = max(1.0 - share, 0.0)
-            self._structure[0] = keep * self._structure[0] + share * steps
-            self._structure[1] = keep * self._structure[1] + share
-        self._recent = [joined[-lag:]]
-
-    def _level(self) -> float:
-        """D(t) = level t^(2/3), the loss above the bandwidth allowed for."""
-        if self._structure[1] <= 0.0:
-            return 0.5
-        seen = self._structure[0] / self._structure[1]
-        lag = 1.0 / self._settings.bandwidth
-        return float(seen / (lag ** (2.0 / 3.0) * (1.0 - 2.0 * _VARIANCE_ABOVE)))
-
     def small_scales(self) -> SmallScales | None:
         """From the structure function."""
-        if self._structure[1] <= 0.0:
-            return None
-        level = self._level()
-        return SmallScales(level, level)
+        return self._scales.small_scales()
 
     def health(self) -> list[HealthItem]:
         """Nothing to say."""

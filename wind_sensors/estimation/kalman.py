@@ -9,7 +9,13 @@ import numpy.typing as npt
 
 from wind_sensors.estimation import forward
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
-from wind_sensors.estimation.constants import NoseAxis, axes_of, instruments_of, rotors_of
+from wind_sensors.estimation.constants import (
+    NoseAxis,
+    axes_of,
+    instruments_of,
+    measures_vertical,
+    rotors_of,
+)
 from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
 from wind_sensors.estimation.filter_state import (
     EDGE,
@@ -31,7 +37,11 @@ from wind_sensors.estimation.readings import headings
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.smoother_kernel import smooth
 from wind_sensors.estimation.start import start_filter
-from wind_sensors.estimation.turbulence_process import UNRESOLVED_VARIANCE, WIND_STATES
+from wind_sensors.estimation.turbulence_process import (
+    UNRESOLVED_VARIANCE,
+    VERTICAL_LEVEL,
+    WIND_STATES,
+)
 from wind_sensors.estimation.wind_state import wind_of
 from wind_sensors.station.changes import Segment, segments
 from wind_sensors.station.model import Cup, Propeller, Station
@@ -94,6 +104,7 @@ class KalmanCore:
         rotors, vanes = len(self._rotors), len(self._axes)
         self.filter: FilterState = empty_filter(rotors, vanes)
         self.filter.height[0] = station.recording.measuring_height
+        self.filter.height[1] = float(measures_vertical(station))
         self.rotor_names = [r.name for r in self._rotors]
         self.vane_names = [v.name for v in self._axes]
         for i, rotor in enumerate(self._rotors):
@@ -265,7 +276,7 @@ class KalmanCore:
         time = out.time[:filled].copy()
         rows = out.circumstances[:filled]
         velocity = out.states[:filled, :3].copy()
-        unresolved = np.array([self.filter.levels[0], self.filter.levels[2], self.filter.levels[2]])
+        unresolved = self.filter.levels[[0, 2, VERTICAL_LEVEL]]
         covariance = out.covariance[:filled, :3, :3] + UNRESOLVED_VARIANCE * np.diag(
             [unresolved[:2].mean(), unresolved[:2].mean(), unresolved[2]]
         )

@@ -17,7 +17,13 @@ import numpy.typing as npt
 from wind_sensors.compiled import compiled
 from wind_sensors.estimation.filter_state import EDGE, OUTPUT, READING, FilterState, Ring
 from wind_sensors.estimation.forward import Instruments
-from wind_sensors.estimation.turbulence_process import LEVELS, PAIRS, SMALL_SCALES, WIND_STATES
+from wind_sensors.estimation.turbulence_process import (
+    LEVELS,
+    PAIRS,
+    SMALL_SCALES,
+    VERTICAL_LEVEL,
+    WIND_STATES,
+)
 from wind_sensors.estimation.wind_state import component
 
 FloatArray = npt.NDArray[np.float64]
@@ -103,6 +109,17 @@ def _score_levels(
             for b in range(2):
                 for q in range(count):
                     both[a, b] += gain[r, a] * adjoint_covariance[w + r, w + q] * gain[q, b]
+    for i in range(2 * PAIRS, w):
+        g = adjoint[i]
+        m = adjoint_covariance[i, i]
+        for r in range(count):
+            g += gain[r, 2] * adjoint[w + r]
+            m += 2.0 * gain[r, 2] * adjoint_covariance[i, w + r]
+            for q in range(count):
+                m += gain[r, 2] * adjoint_covariance[w + r, w + q] * gain[q, 2]
+        upwards = ring.noise[at, i - PAIRS, 0]
+        score[VERTICAL_LEVEL] += upwards * g * g
+        expected[VERTICAL_LEVEL] += upwards * m
     e = ring.heading[at, 0]
     n = ring.heading[at, 1]
     cross = np.empty((2, 2))
@@ -322,6 +339,8 @@ def _follow(
         f.level_information[g] = old + weight * (expected[g] - old) if old > 0.0 else expected[g]
         level = _moved(f.levels[g], score[g], expected[g], f.level_information[g], weight)
         f.levels[g] = min(max(level, 1e-6), highest)
+    if f.height[1] == 0.0:
+        f.levels[VERTICAL_LEVEL] = f.levels[2]
     for i in range(noise_score.shape[0]):
         if noise_expected[i] <= 0.0:
             continue

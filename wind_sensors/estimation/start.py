@@ -73,7 +73,7 @@ def start_filter(
         s: Constants.
         rotors, axes: In the filter's order.
         blocks: The first blocks of messages.
-        circumstances: At the start, shape (22,).
+        circumstances: At the start, shape (23,).
         intensity: Assumed turbulence intensity [1].
         origin: Start of the recording [ns].
     """

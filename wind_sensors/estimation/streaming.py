@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
+from wind_sensors.estimation.array_methods import InverseArrayCore, NaiveArrayCore
 from wind_sensors.estimation.constants import axes_of, is_array, rotors_of
 from wind_sensors.estimation.core import Core, Estimates, joined, trusted
 from wind_sensors.estimation.health import (
@@ -231,6 +232,10 @@ class StreamingEstimator:
         assert origin is not None
         if self.settings.method == "kalman":
             return KalmanCore(self.station, self.settings, self._block, origin)
+        if is_array(self.station):
+            if self.settings.method == "inverse":
+                return InverseArrayCore(self.station, self.settings)
+            return NaiveArrayCore(self.station, self.settings)
         if self.settings.method == "inverse":
             return InverseCore(self.station, self.settings, origin)
         return NaiveCore(self.station, self.settings, origin)

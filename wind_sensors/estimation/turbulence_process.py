@@ -5,8 +5,9 @@ geometric progression and whose variances grow as tau^(2/3). Their structure fun
 the inertial range, D(t) = level t^(2/3) (Kristensen et al. (2014), (44)); the sum over a
 continuum of such processes is exact because
 int (1 - exp(-t/tau)) tau^(2/3) d(ln tau) = (3/2) Gamma(1/3) t^(2/3).
-Two levels for each component, one for the small scales and one for the large, follow the data:
-together they carry intensity and length scale.
+Two levels for each horizontal component, one for the small scales and one for the large, follow
+the data: together they carry intensity and length scale. The vertical wind has a level of its own
+where the station measures it; elsewhere it takes that of the small scales across.
 """
 
 from __future__ import annotations
@@ -42,8 +43,9 @@ WANDERING = (2.0 * SHARE * _SLOWER ** (-1.0 / 3.0)) / (1.0 - PROGRESSION ** (-1.
 
 PAIRS = len(TIME_CONSTANTS) + 1
 WIND_STATES = 2 * PAIRS + len(VERTICAL_CONSTANTS)
-LEVELS = 4
-"""Along-wind small and large scales, cross-wind small and large scales."""
+LEVELS = 5
+"""Along-wind small and large scales, cross-wind small and large scales, vertical."""
+VERTICAL_LEVEL = 4
 
 
 _FAST_VERTICAL = float(np.sum(VERTICAL_VARIANCES[:-1])) + UNRESOLVED_VARIANCE
@@ -61,7 +63,7 @@ def slow_vertical_variance(height: float, speed: float) -> float:
     return float(min(max(total - _FAST_VERTICAL, 0.0), VERTICAL_VARIANCES[-1]))
 
 
-def initial_levels(speed: float, intensity: float) -> tuple[float, float, float, float]:
+def initial_levels(speed: float, intensity: float) -> tuple[float, ...]:
     """Levels of a surface-layer wind of a given speed [m/s] and turbulence intensity [1].
 
     The variance is spread over eddies up to a minute: level = 2 sigma^2 / (60 s)^(2/3); across
@@ -69,4 +71,5 @@ def initial_levels(speed: float, intensity: float) -> tuple[float, float, float,
     """
     sigma2 = (max(speed, 1.0) * intensity) ** 2
     level = 2.0 * sigma2 / 60.0 ** (2.0 / 3.0)
-    return level, level, 4.0 / 3.0 * level, 4.0 / 3.0 * level
+    across = 4.0 / 3.0 * level
+    return level, level, across, across, across

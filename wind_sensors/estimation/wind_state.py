@@ -15,6 +15,7 @@ from wind_sensors.estimation.turbulence_process import (
     TIME_CONSTANTS,
     VARIANCES,
     VERTICAL_CONSTANTS,
+    VERTICAL_LEVEL,
     VERTICAL_VARIANCES,
     WANDERING,
     WIND_STATES,
@@ -103,6 +104,8 @@ def prepare_wind_noise(
         d = math.exp(-dt / VERTICAL_CONSTANTS[i])
         ring.decay[slot, 2 * PAIRS + i] = d
         variance = VERTICAL_VARIANCES[i]
-        if i == _VERTICAL - 1:
+        if i == _VERTICAL - 1 and f.height[1] == 0.0:
             variance = slow_vertical_variance(f.height[0], size)
-        noise[PAIRS + i, 0] = f.levels[2] * variance * (1.0 - d * d)
+        upwards = f.levels[VERTICAL_LEVEL] * variance * (1.0 - d * d)
+        ring.noise[slot, PAIRS + i, 0] = upwards
+        noise[PAIRS + i, 0] = upwards
