@@ -45,6 +45,9 @@ HIGHEST_FREQUENCY = 1.25
 LOW_END = 0.02
 """Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
 
+LONGEST_GAP = 1.0
+"""Where the reference is silent for longer [s], nothing is compared."""
+
 SHORTEST = 60.0
 """A recording needs this much time in common with its reference [s]."""
 
@@ -126,7 +129,7 @@ class Comparison:
 
     def within(self, mask: FloatArray) -> Comparison:
         """The same comparison in the blocks of a mask only, shape (n,)."""
-        masked = replace(self, mask=mask)
+        masked = replace(self, mask=self.masked(mask))
         measured = masked.observe(self.recording.pulses, self.recording.angles)
         return replace(masked, measured=measured)
 
@@ -206,15 +209,15 @@ class Comparison:
                 intervals = interval_statistics(
                     pulses[channel.instrument], rotor, self.wind_from, self.grid, self.mask
                 )
-                full = spectra.to_cosine(self._masked(values - np.mean(values)))
-                full[0] = np.sqrt(values.size) * np.mean(self._masked(values))
+                full = spectra.to_cosine(self.masked(values - np.mean(values)))
+                full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
                 bands = self._log_spectrum(full, self.grid.dt, channel, 2.2)
                 statistics[channel.name] = np.concatenate((bands, intervals))
             else:
                 readings = angles[channel.instrument]
                 deviation = angle_series(readings, self.direction, self.grid)
                 values = deviation * self.speed
-                full = spectra.to_cosine(self._masked(values))
+                full = spectra.to_cosine(self.masked(values))
                 statistics[channel.name] = np.concatenate(
                     (
                         self._vane_spectrum(readings, channel),
@@ -227,7 +230,8 @@ class Comparison:
             cosine[channel.name] = full[: self.coefficients]
         return Simulated(cosine, series, statistics)
 
-    def _masked(self, values: FloatArray) -> FloatArray:
+    def masked(self, values: FloatArray) -> FloatArray:
+        """Values of the bins with those outside the mask set to zero."""
         return values if self.mask is None else values * self.mask
 
     def _vane_spectrum(self, readings: Angles, channel: Channel) -> FloatArray:
@@ -237,7 +241,7 @@ class Comparison:
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
         deviation = np.nan_to_num(np.angle(np.exp(1j * (readings.angle - around))))
-        weighted = deviation * np.interp(time, self.grid.centres, self._masked(self.speed))
+        weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
         return self._log_spectrum(
             spectra.to_cosine(np.asarray(weighted)), dt, channel, 0.4 / dt
         )
@@ -266,6 +270,7 @@ class Comparison:
             slow = (self.direction - np.mean(self.direction)) * self.speed
             measured, expected = measured + slow, expected + slow
         n = self.coefficients
+        measured, expected = self.masked(measured), self.masked(expected)
         return spectra.coherence_of(
             spectra.to_cosine(measured)[:n], spectra.to_cosine(expected)[:n],
             self.grid.dt, self.grid.n,
@@ -357,4 +362,22 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
         wind_from=np.interp(grid.centres, at, coming_from),
         measured=empty,
     )
+    seen = _where_reference_is(recording, grid)
+    if seen is not None:
+        return comparison.within(seen)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
+
+
+def _where_reference_is(recording: Recording, grid: Grid) -> FloatArray | None:
+    """Weights that are zero where the reference has a gap; None if it has none."""
+    reference = recording.reference
+    if reference is None:
+        return None
+    time = grid.seconds(reference.time[np.isfinite(reference.velocity).all(axis=1)])
+    gaps = np.flatnonzero(np.diff(time) > LONGEST_GAP)
+    if gaps.size == 0:
+        return None
+    weight = np.ones(grid.n)
+    for k in gaps:
+        weight[(grid.centres > time[k] - 1.0) & (grid.centres < time[k + 1] + 1.0)] = 0.0
+    return np.clip(_smoothed(weight, 9) * 2.0 - 1.0, 0.0, 1.0)

@@ -200,7 +200,7 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
         scale = comparison.speed
         for kind, low, high, label, inside in parts:
             row = np.zeros(total)
-            shift = spectra.to_cosine(np.where(inside, scale, 0.0))[:n]
+            shift = spectra.to_cosine(comparison.masked(np.where(inside, scale, 0.0)))[:n]
             row[number * n : (number + 1) * n] = trust.slope * shift / trust.deviation
             white = whitener.through_standing(row)
             length = float(np.linalg.norm(white))

@@ -135,6 +135,7 @@ def windowed_signature(
     for channel in comparison.channels:
         name = channel.name
         moved = np.where(inside, planted.series[name] - without.series[name], 0.0)
+        moved = comparison.masked(moved)
         coefficients = spectra.to_cosine(moved)[: comparison.coefficients]
         parts.append(trust[name].slope * coefficients / trust[name].deviation)
     for channel in comparison.channels:

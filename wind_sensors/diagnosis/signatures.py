@@ -23,10 +23,6 @@ from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 
-SMALLEST_STANDING = 0.15
-"""Every effect is taken to be present on a healthy day with at least this share of the smallest
-size worth reporting."""
-
 _SECTOR_SHARE = 0.01
 
 
@@ -56,7 +52,7 @@ class Template:
         """Least standing size in units of the template; a bank of templates shares it."""
         size = max(self.effect.relative_size(self.values), 0.5)
         crowd = max(1.0, len(self.effect.templates) / 4.0)
-        return float(SMALLEST_STANDING / size / np.sqrt(crowd))
+        return float(self.effect.standing / size / np.sqrt(crowd))
 
     def planted(self, station: Station) -> Station:
         """The station with the effect."""

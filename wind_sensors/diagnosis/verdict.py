@@ -394,7 +394,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "recording": diagnosis.recording,
         "verdict": diagnosis.verdict,
         "null_calibrated": diagnosis.calibrated,
-        "findings": [_finding_json(f, length) for f in diagnosis.findings],
+        "findings": [finding_json(f, length) for f in diagnosis.findings],
         "unexplained": {
             "p": round(diagnosis.unexplained.p, 4),
             "share": round(diagnosis.unexplained.share, 4),
@@ -418,7 +418,7 @@ def _rounded(value: float) -> float | None:
     return float(f"{value:.5g}") if np.isfinite(value) else None
 
 
-def _finding_json(finding: Finding, length: float) -> dict[str, Any]:
+def finding_json(finding: Finding, length: float) -> dict[str, Any]:
     term = finding.term
     begin, end = term.interval
     region = finding.located.region

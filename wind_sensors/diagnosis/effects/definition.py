@@ -71,6 +71,8 @@ class Effect:
             screening uses one signature per template.
         confusable: Effects it can be mistaken for, with the measurement that separates them.
         everywhere: It concerns all the instruments it applies to at once (the mount, the air).
+        standing: Share of the smallest size worth reporting at which it is taken to be present on
+            any healthy day, whatever healthy recordings say; 0 for what is there or is not.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.
@@ -88,6 +90,7 @@ class Effect:
     templates: tuple[dict[str, float], ...]
     confusable: Mapping[str, str] = field(default_factory=dict)
     everywhere: bool = False
+    standing: float = 0.15
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None
 

@@ -51,6 +51,7 @@ MISSED_PULSES = Effect(
     "or with the loss probability",
     source="counter with a non-paralysable dead time",
     region="high rotor rates; doubled pulse intervals",
+    standing=0.0,
     parameters=(
         Parameter("dead_time", "s", 0.0, 0.5, minimum=0.004, step=0.0005),
         Parameter("loss_probability", "1", 0.0, 0.9, minimum=0.01, step=0.003),
@@ -83,6 +84,7 @@ EXTRA_PULSES = Effect(
     equation="a second edge follows after the bounce delay, with the bounce probability",
     source="contact bounce of a reed switch",
     region="very short pulse intervals, all speeds",
+    standing=0.0,
     parameters=(
         Parameter("bounce_probability", "1", 0.0, 1.0, minimum=0.01, step=0.003, starts=(0.02,)),
         Parameter("bounce_delay", "s", 0.0002, 0.1, healthy=None, step=0.0005),
@@ -115,6 +117,7 @@ ENCODER_SLOT_ERROR = Effect(
     equation="edge of slot k at (k + error_k) 2 pi / n; scatter = rms of the errors",
     source="geometry of the disc",
     region="pulse intervals against rotor angle, all speeds alike",
+    standing=0.0,
     parameters=(Parameter("scatter", "1", 0.0, 0.3, minimum=0.012, step=0.004, starts=(0.03,)),),
     applies=lambda entry, station: isinstance(entry, Rotor) and entry.pulses_per_revolution > 2,
     update=_slots,
@@ -139,6 +142,7 @@ STUCK_SENSOR = Effect(
     equation="reading(t) = reading(start) for start < t < stop",
     source="definition",
     region="one interval of time",
+    standing=0.0,
     parameters=(
         Parameter("start", "s", -1.0, 1e6, healthy=None, step=1.0),
         Parameter("stop", "s", 0.0, 1e6, healthy=None, step=1.0),

@@ -187,6 +187,7 @@ DAMAGED_CUP = Effect(
     equation="torque += e A^2 cos(psi - alpha); steady rate times gain",
     source="derived: one unequal cup of three",
     region="once per revolution, locked to the wind's direction; a lower calibration",
+    standing=0.0,
     parameters=(
         Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.02, step=0.005, starts=(0.05,)),
         Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.004, starts=(0.97,)),
@@ -247,6 +248,7 @@ ICING = Effect(
     equation="l S = gain * U - U0 and l0 = factor * l0_cal together",
     source="K94, eq. (6)",
     region="near and below 0 deg C; all speeds and high frequencies",
+    standing=0.0,
     parameters=(
         Parameter("gain", "1", 0.2, 1.1, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(

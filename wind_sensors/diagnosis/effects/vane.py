@@ -208,6 +208,7 @@ POTENTIOMETER_GAP = Effect(
     equation="reading = nearest edge while |phi - centre| < width/2",
     source="construction of a potentiometer",
     region="one narrow sector of headings",
+    standing=0.0,
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),
         Parameter("width", "deg", 0.0, 90.0, minimum=5.0, step=1.0, starts=(10.0, 20.0)),
@@ -231,6 +232,7 @@ QUANTISATION = Effect(
     equation="reading = step * round(phi / step)",
     source="definition",
     region="all, in the histogram of the readings",
+    standing=0.0,
     parameters=(
         Parameter("step", "deg", 0.0, 95.0, minimum=4.0, step=0.5, starts=(5.0, 11.25, 22.5)),
     ),
@@ -277,6 +279,7 @@ SENSOR_SWAP = Effect(
     equation="reading = -phi",
     source="definition",
     region="all directions",
+    standing=0.0,
     parameters=(Parameter("reversed", "1", -0.2, 1.2, minimum=0.6, step=1.0, starts=(1.0,)),),
     applies=_is_vane,
     update=_reversed,

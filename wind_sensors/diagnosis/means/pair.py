@@ -16,7 +16,7 @@ FloatArray = npt.NDArray[np.float64]
 SLOWEST = 2.0
 """Below this wind [m/s] starting speeds decide, and pairs are not compared."""
 
-MOST_ROWS = 12_000
+MOST_ROWS = 8_000
 SECTORS = 36
 SPEED_CLASSES = (0.0, 5.0, 8.0, 100.0)
 _OUTLIER = 3.0

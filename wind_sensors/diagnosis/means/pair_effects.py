@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter
 
 ROTOR_EFFECTS = (
     "wake_shadow", "flow_distortion", "calibration_drift", "calibration_offset",
@@ -13,8 +13,11 @@ ROTOR_EFFECTS = (
 )  # fmt: skip
 """Effects that leave a trace in a mean speed; the others only shape what the mean hides."""
 
-SINCE_A_MOMENT = ("calibration_drift", "calibration_offset")
+SINCE_A_MOMENT = ("calibration_drift", "calibration_offset", "vane_offset")
 """Of them, those that are looked for from a moment on, or until one."""
+
+WIDEST_WAKE = 15.0
+"""Standard deviation of the widest wake [deg]."""
 
 _NOT_SEEN = {
     "angular_response": ("skewness",),
@@ -38,11 +41,11 @@ def rotor_effects() -> dict[str, Effect]:
             t
             for t in effect.templates
             if any(t[p.name] != p.healthy for p in effect.parameters if p.name not in hidden)
+            and t.get("width", 0.0) <= WIDEST_WAKE
         )
         parameters = tuple(p for p in effect.parameters if p.name not in hidden)
         if name == "wake_shadow":
-            # With a reference as close as the other boom, a faster sector here is a wake there.
-            parameters = tuple(replace(p, low=0.0) if p.name == "depth" else p for p in parameters)
+            parameters = tuple(_narrow(p) for p in parameters)
         found[name] = replace(
             effect,
             parameters=parameters,
@@ -50,3 +53,13 @@ def rotor_effects() -> dict[str, Effect]:
             everywhere=False,
         )
     return found
+
+
+def _narrow(parameter: Parameter) -> Parameter:
+    """A wake between two booms slows down, and ends within some 30 degrees.
+
+    A faster sector of one boom is a slower one of the other; what is wider is flow distortion.
+    """
+    if parameter.name == "depth":
+        return replace(parameter, low=0.0)
+    return replace(parameter, high=WIDEST_WAKE) if parameter.name == "width" else parameter

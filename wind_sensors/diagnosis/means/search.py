@@ -35,7 +35,10 @@ SMALLEST_KEPT = 0.1
 """Terms below the smallest size worth reporting are kept in the model, or a larger one would take
 their place; below this share of it they are not worth a parameter."""
 
-MOST_TERMS = 8
+SMALLEST_GAIN = 0.005
+"""Share of the whole cost that a term must remove from held-out blocks."""
+
+MOST_TERMS = 7
 CANDIDATES = 9
 DRAWS = 999
 
@@ -128,7 +131,7 @@ def screen(
     effects: dict[str, Effect],
     instruments: Sequence[str],
     terms: Sequence[Term],
-    standing: float = 0.0,
+    constant: bool = True,
     seed: int = 1,
 ) -> Screened:
     """Score every template, block by block.
@@ -138,7 +141,8 @@ def screen(
         effects: Catalogue.
         instruments: Which ones may have them.
         terms: What has been named already.
-        standing: Relative size that a signature has on healthy days [1].
+        constant: Whether effects that always hold can be seen; otherwise only beginnings and
+            endings.
         seed: Of the sign flips.
     """
     base = planted(bench.station, terms)
@@ -156,7 +160,7 @@ def screen(
                 signature = -change(term.planted(base))
                 g = signature / bench.noise
                 score, power = psi * g, g * g
-                windows = [ALWAYS]
+                windows = [ALWAYS] if constant else []
                 if name in SINCE_A_MOMENT:
                     windows += _windows(bench)
                 s = _sums(score, bench.block, bench.blocks)
@@ -372,6 +376,7 @@ def search(
     instruments: Sequence[str],
     progress: Callable[[float], None] | None = None,
     most: int = MOST_TERMS,
+    constant: bool = True,
 ) -> Explained:
     """Add effects while they explain held-out blocks.
 
@@ -385,7 +390,7 @@ def search(
     p = 1.0
     needed = float(stats.t.ppf(1.0 - 0.005, bench.blocks - 1))
     while len(named) < most:
-        screened = screen(bench, effects, instruments, terms)
+        screened = screen(bench, effects, instruments, terms, constant)
         p = screened.p
         if p > FAMILY_P:
             break
@@ -404,6 +409,8 @@ def search(
             break
         trials.sort(key=lambda t: -float(t[1].sum()))
         best, gain, _ = trials[0]
+        if float(gain.sum()) < SMALLEST_GAIN * float(costs[0].sum()):
+            break
         equal, others, runner = [], [], None
         for other, its_gain, _ in trials[1:]:
             behind = gain - its_gain
@@ -429,6 +436,8 @@ def _inside(term: Term) -> bool:
     if term.relative_size < SMALLEST_KEPT:
         return False
     for p in term.effect.parameters:
+        if p.healthy is None and not p.wraps and term.values[p.name] > 0.98 * p.high:
+            return False
         if p.healthy is None or p.minimum <= 0.0:
             continue
         margin = 0.005 * (p.high - p.low)
