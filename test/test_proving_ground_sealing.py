@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -63,7 +64,7 @@ def judged(
     causes = [{"effect": effect, "size_factor": size} for effect in truth]
     answer = {"stratum": stratum, "kind": "A", "causes": causes}
     diagnosis = {"verdict": verdict, "findings": list(findings)}
-    return judge("x", answer, diagnosis, {"seconds": 3.0, "memory": 100.0})
+    return judge("x", answer, diagnosis, {"seconds": 3.0, "processor": 5.0, "memory": 100.0})
 
 
 def test_a_sealed_text_opens_with_its_key_and_with_no_other() -> None:
@@ -120,6 +121,14 @@ def test_the_diagnosing_process_sees_the_recording_and_nothing_else(
     results = judge_all(sealed.folder, open_answers(sealed.folder, KEY))
     healthy = next(j for j in results if j.stratum == "healthy")
     assert healthy.outcome == "wrong name"
+
+
+def test_answers_stay_shut_until_all_is_said(sealed: Sealed, tmp_path: Path) -> None:
+    copy = tmp_path / "set"
+    shutil.copytree(sealed.folder, copy, ignore=shutil.ignore_patterns("runs"))
+    with pytest.raises(UserError, match="2 recordings have not been diagnosed"):
+        score(copy, KEY, tmp_path / "score")
+    assert score(copy, KEY, tmp_path / "score", partial=True)[0].total == 0
 
 
 def test_opening_writes_a_card_that_lists_the_failures(sealed: Sealed, tmp_path: Path) -> None:

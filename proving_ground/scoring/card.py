@@ -22,8 +22,9 @@ def write_card(folder: Path, judged: Sequence[Judged], about: dict[str, Any]) ->
     folder.mkdir(parents=True, exist_ok=True)
     rates = promised_rates(judged)
     doses = _doses(judged)
-    draw_rates(rates, folder / "rates.png")
-    draw_confusion(judged, folder / "confusion.png")
+    if judged:
+        draw_rates(rates, folder / "rates.png")
+        draw_confusion(judged, folder / "confusion.png")
     if doses:
         draw_doses(doses, folder / "dose_response.png")
     (folder / CARD).write_text(_page(judged, rates, doses, about), encoding="utf-8")
@@ -51,12 +52,13 @@ def _page(
     lines = ["# Score card", ""]
     lines += [f"- {key}: {value}" for key, value in about.items()]
     lines += [f"- recordings: {len(judged)}", ""]
+    clock, processor = median_seconds(judged)
     lines += ["| what | rate | 95 % interval | promised | kept |", "|---|---|---|---|---|"]
     lines += [_rate_row(r) for r in rates]
     lines += [
         "",
         f"Mean number of names for a finding: {mean_set_size(judged):.2f} (promised below 1.5). "
-        f"Median run time: {median_seconds(judged):.1f} s.",
+        f"Median run time: {clock:.1f} s on the clock, {processor:.1f} s of processors.",
         "",
         "![rates](rates.png)",
         "",

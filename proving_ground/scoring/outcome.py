@@ -27,8 +27,8 @@ class Judged:
 
     truth: names of the concealed causes ("unknown" for one that is in no catalogue); size: of the
     smallest of them in multiples of its minimum; named: certain findings; sets: groups of
-    alternatives; reported: the column of the confusion matrix; excess_removed [1] on held-out
-    data, or None.
+    alternatives; seconds on the clock and of processors; excess_removed [1] on held-out data, or
+    None.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Judged:
     sets: tuple[tuple[str, ...], ...]
     outcome: str
     seconds: float
+    processor: float
     memory: float
     excess_removed: float | None
     coverage: tuple[Coverage, ...]
@@ -95,6 +96,7 @@ def judge(
         sets=sets,
         outcome=outcome,
         seconds=float(run["seconds"]) if run else 0.0,
+        processor=float(run.get("processor", 0.0)) if run else 0.0,
         memory=float(run["memory"]) if run else 0.0,
         excess_removed=_excess_removed(diagnosis) if diagnosis and outcome == "exact" else None,
         coverage=covered(causes, diagnosis) if diagnosis and outcome == "exact" else (),

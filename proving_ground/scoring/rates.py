@@ -183,10 +183,12 @@ def promised_rates(judged: Sequence[Judged]) -> list[Rate]:
     ]
 
 
-def median_seconds(judged: Sequence[Judged]) -> float:
-    """Median run time [s] of the diagnoses that ended."""
-    ended = [j.seconds for j in judged if j.verdict != "failed"]
-    return median(ended) if ended else float("nan")
+def median_seconds(judged: Sequence[Judged]) -> tuple[float, float]:
+    """Median run time [s], on the clock and of processors, of the diagnoses that ended."""
+    ended = [j for j in judged if j.verdict != "failed"]
+    if not ended:
+        return float("nan"), float("nan")
+    return median(j.seconds for j in ended), median(j.processor for j in ended)
 
 
 def mean_set_size(judged: Sequence[Judged]) -> float:

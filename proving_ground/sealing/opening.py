@@ -58,19 +58,30 @@ def _load(path: Path) -> dict[str, Any] | None:
     return found
 
 
-def score(folder: Path, key: bytes, output: Path, *, force: bool = False) -> list[Rate]:
-    """Open a sealed set and write its score card.
+def score(
+    folder: Path, key: bytes, output: Path, *, force: bool = False, partial: bool = False
+) -> list[Rate]:
+    """Open a sealed set and write its score card, of what was diagnosed alone where `partial`.
 
-    Raises UserError if the output exists and `force` is not given.
+    Raises UserError if the output exists and `force` is not given, or if something was not
+    diagnosed yet and `partial` is not given: answers must not be seen before all is said.
     """
     if output.exists() and not force:
         raise UserError("there is a score already", str(output), "Add --force to replace it.")
-    answers = open_answers(folder, key)
-    judged = judge_all(folder, answers)
     manifest = read_manifest(folder)
+    said = [n for n in manifest["recordings"] if (folder / RUNS / n / RUN_FILE).is_file()]
+    missing = len(manifest["recordings"]) - len(said)
+    if missing and not partial:
+        raise UserError(
+            f"{missing} recordings have not been diagnosed yet",
+            str(folder),
+            "`wind prove run` goes on where it stopped; --partial scores what there is.",
+        )
+    answers = open_answers(folder, key)
+    judged = judge_all(folder, {n: a for n, a in answers.items() if n in said})
     about = {
         "commitment, checked": manifest["commitment"],
-        "diagnosed": sum(j.outcome != "failed" for j in judged),
+        "not diagnosed": missing,
         "peak memory [MB]": round(max((j.memory for j in judged), default=0.0)),
     }
     rates = write_card(output, judged, about)

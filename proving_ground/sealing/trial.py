@@ -31,10 +31,12 @@ PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "VIRTUAL_ENV",
 
 @dataclass(frozen=True)
 class Run:
-    """How one diagnosis went: exit status (-1: out of time), seconds and peak memory [MB]."""
+    """How one diagnosis went: exit status (-1: out of time), seconds on the clock and of
+    processors, and peak memory [MB]."""
 
     status: int
     seconds: float
+    processor: float
     memory: float
 
 
@@ -162,4 +164,9 @@ def _supervise(command: Sequence[str], room: Path, log: Path, timeout: float) ->
                 process.returncode = -1
                 break
             time.sleep(0.02)
-    return Run(process.returncode, time.monotonic() - begun, usage.ru_maxrss / 1024.0)
+    return Run(
+        process.returncode,
+        time.monotonic() - begun,
+        usage.ru_utime + usage.ru_stime,
+        usage.ru_maxrss / 1024.0,
+    )

@@ -46,6 +46,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     opened.add_argument("--key", required=True, metavar="FILE|HEX")
     opened.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     opened.add_argument("--force", action="store_true", help="write over an earlier score")
+    opened.add_argument("--partial", action="store_true", help="score before all is diagnosed")
 
     peers = steps.add_parser("peers", help="other methods on the recordings of an opened set")
     peers.add_argument("folder", type=Path, metavar="DIR")
@@ -137,7 +138,13 @@ def _open(arguments: argparse.Namespace) -> int:
     from proving_ground.sealing.opening import score
 
     output = arguments.output or arguments.folder / "score"
-    rates = score(arguments.folder, _read_key(arguments.key), output, force=arguments.force)
+    rates = score(
+        arguments.folder,
+        _read_key(arguments.key),
+        output,
+        force=arguments.force,
+        partial=arguments.partial,
+    )
     _print_rates(rates)
     print(f"wrote {output}")
     return int(any(rate.met is False for rate in rates))
