@@ -81,9 +81,36 @@ def _translation(rotor: Propeller, vane: Angle, mu2: float, eps: float, speed: f
     return delta(arm) - delta(0.0)
 
 
+def _excess_of_scalar_mean(turbulence: WindowTurbulence) -> BiasTerm:
+    excess = turbulence.speed / max(turbulence.vector_speed, 0.1) - 1.0
+    return BiasTerm(excess, 0.05 * abs(excess))
+
+
+def array_terms(turbulence: WindowTurbulence, indicated_speed: float) -> dict[str, BiasTerm]:
+    """Terms of an array relative to the mean speed, as `predicted_terms` names them.
+
+    What lag, angular response and friction do to propellers at large angles has no closed form:
+    `u` is all of it together, the indicated against the corrected vector mean.
+
+    Args:
+        turbulence: Of the window.
+        indicated_speed: Of the vector mean by the calibration and the cosine [m/s].
+    """
+    total = indicated_speed / max(turbulence.vector_speed, 0.1) - 1.0
+    none = BiasTerm(0.0, 0.0)
+    return {
+        "u": BiasTerm(total, _LEVEL_UNCERTAINTY * abs(total)),
+        "v": _excess_of_scalar_mean(turbulence),
+        "w": none,
+        "vane_lag": none,
+        "translation": none,
+        "arithmetic_mean": none,
+    }
+
+
 def predicted_terms(
     rotor: Cup | Propeller,
-    vane: Angle | None,
+    vane: Angle,
     turbulence: WindowTurbulence,
     arithmetic_mean: float,
 ) -> dict[str, BiasTerm]:
@@ -91,7 +118,7 @@ def predicted_terms(
 
     Args:
         rotor: The rotor.
-        vane: What tells the direction; None for an array, whose only closed term is v.
+        vane: What tells the direction.
         turbulence: Of the window.
         arithmetic_mean: Excess of the mean over revolutions over the mean over time [1], exact;
             K94 (28).
@@ -101,10 +128,6 @@ def predicted_terms(
         vane does not follow), translation (the propeller moves with the vane), arithmetic_mean.
     """
     speed = max(turbulence.speed, 0.1)
-    vector = max(turbulence.vector_speed, 0.1)
-    v_term = turbulence.speed / vector - 1.0
-    if vane is None:
-        return {"v": BiasTerm(v_term, 0.05 * abs(v_term))}
     mu2 = response_curvature(rotor)
     eps = dissipation(turbulence.small_scales.along, speed)
     local = inertial_bias(
@@ -123,7 +146,7 @@ def predicted_terms(
         lag = 0.5 * vane_loss(vane, turbulence) / speed**2
     return {
         "u": BiasTerm(local.u, _LEVEL_UNCERTAINTY * abs(local.u)),
-        "v": BiasTerm(v_term, 0.05 * abs(v_term)),
+        "v": _excess_of_scalar_mean(turbulence),
         "w": BiasTerm(local.w, _VERTICAL_UNCERTAINTY * abs(local.w)),
         "vane_lag": BiasTerm(lag, _LEVEL_UNCERTAINTY * abs(lag)),
         "translation": BiasTerm(translation, _LEVEL_UNCERTAINTY * abs(translation)),

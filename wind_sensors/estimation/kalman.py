@@ -33,6 +33,7 @@ from wind_sensors.estimation.intake import Block
 from wind_sensors.estimation.kalman_health import kalman_health
 from wind_sensors.estimation.kalman_kernel import run
 from wind_sensors.estimation.outputs import HealthItem
+from wind_sensors.estimation.propeller_watch import PropellerWatch
 from wind_sensors.estimation.readings import headings
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.smoother_kernel import smooth
@@ -113,6 +114,7 @@ class KalmanCore:
             if rotor.pulses_per_revolution > LARGEST_SLOTS:
                 self.filter.slots[i] = 1
         self._ring: Ring = empty_ring(64, rotors, vanes)
+        self.watch = PropellerWatch(self._segment.station, settings)
         self._waiting: list[Block] = []
         self._started = False
         self.restarts = 0
@@ -283,9 +285,12 @@ class KalmanCore:
         to_earth = rows[:, forward.MOUNT_ROTATION : forward.MOUNT_ROTATION + 9].reshape(-1, 3, 3)
         apparent = np.einsum("nji,nj->ni", to_earth, velocity - rows[:, :3])
         in_sensor = np.einsum("nji,njk,nkl->nil", to_earth, covariance, to_earth)
-        return Estimates(
-            time, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor
-        )
+        estimates = Estimates(
+            time, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor,
+            to_earth,
+        )  # fmt: skip
+        self.watch.take(estimates, out.states[:filled, 3 : 3 + 2 * len(self._rotors) : 2])
+        return estimates
 
     def finish(self) -> Estimates:
         """No block will follow; the remaining estimates."""

@@ -19,7 +19,7 @@ _LOST_SHARE = 0.005
 
 
 def kalman_health(core: KalmanCore) -> list[HealthItem]:
-    """Items `<rotor> edges`, `<vane> readings` and `estimate`."""
+    """Items `<rotor> edges`, `<vane> readings`, `<propeller> angle` and `estimate`."""
     f = core.filter
     items = []
     rotors = len(core.rotor_names)
@@ -54,11 +54,14 @@ def kalman_health(core: KalmanCore) -> list[HealthItem]:
                 f"{name} readings", HealthLevel.OK, "Readings fit the vane's motion.", values
             )
         )
+    items += core.watch.health(((f.tally[:, 0] > 0) & (f.stride > 0)).tolist())
     seen = f.innovation[:, 1] > 50.0
     worst = float(ratios[seen].max()) if seen.any() else 1.0
     values = {
         "normalised innovation": f"{worst:.2f}",
-        "small-scale level along, across": f"{f.levels[0]:.3f}, {f.levels[2]:.3f} m^2 s^-2 s^-2/3",
+        "small-scale level along, across, up": (
+            f"{f.levels[0]:.3f}, {f.levels[2]:.3f}, {f.levels[4]:.3f} m^2 s^-2 s^-2/3"
+        ),
         "restarts": str(core.restarts),
     }
     if worst > _INCONSISTENT:

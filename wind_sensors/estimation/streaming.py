@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.estimation.array_methods import InverseArrayCore, NaiveArrayCore
+from wind_sensors.estimation.bivane_sampling import sampling_health
 from wind_sensors.estimation.constants import axes_of, is_array, rotors_of
 from wind_sensors.estimation.core import Core, Estimates, joined, trusted
 from wind_sensors.estimation.health import (
@@ -42,6 +43,8 @@ from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station
 FloatArray = npt.NDArray[np.float64]
 
 _PLATFORM, _TEMPERATURE, _PRESSURE = "platform", "temperature", "pressure"
+_SPEED_MEMORY = 0.9
+"""Share of the old value in the running apparent speed, per block."""
 _LOOK_AHEAD_NS = (100_000_000, 2_000_000_000)
 """Of the platform's motion, so that it can be interpolated at the end of a block; at most this long
 is a slow source waited for."""
@@ -117,6 +120,7 @@ class StreamingEstimator:
         self._refused = 0
         self._refusing = False
         self._refused_since = 0
+        self._apparent_speed = 0.0
 
     def _new_intake(self) -> Intake:
         s = self.settings
@@ -220,6 +224,9 @@ class StreamingEstimator:
             self._refusing = silence > self.settings.gap_time * 1e9
         if known.time.size:
             self._estimates.append(known)
+            speed = float(np.linalg.norm(known.apparent, axis=1).mean())
+            keep = _SPEED_MEMORY if self._apparent_speed > 0.0 else 0.0
+            self._apparent_speed = keep * self._apparent_speed + (1.0 - keep) * speed
         return known
 
     def _close(self, windows: list[WindowStatistics]) -> None:
@@ -264,6 +271,7 @@ class StreamingEstimator:
         self._refused = 0
         self._refusing = False
         self._refused_since = 0
+        self._apparent_speed = 0.0
         self._last_health = []
         self._unknown.clear()
 
@@ -271,13 +279,14 @@ class StreamingEstimator:
         """Estimates that became final since the last call, in order of time."""
         block = self.take_estimate_arrays()
         return [
-            WindEstimate(int(t), v, c, a, ac)
-            for t, v, c, a, ac in zip(
+            WindEstimate(int(t), v, c, a, ac, r)
+            for t, v, c, a, ac, r in zip(
                 block.time,
                 block.velocity,
                 block.covariance,
                 block.apparent,
                 block.apparent_covariance,
+                block.to_earth,
                 strict=True,
             )
         ]
@@ -300,6 +309,9 @@ class StreamingEstimator:
             items.append(motion_health(self._refused, self._refusing))
         core = self._core
         items += core.health() if core is not None else self._last_health
+        items += sampling_health(
+            self.station, self._intake.records, self.settings, self._apparent_speed
+        )
         if self._latest is not None:
             items.append(bias_health(self._latest))
         return items

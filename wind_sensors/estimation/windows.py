@@ -9,7 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.array_run import ArrayRunCounter
-from wind_sensors.estimation.bias_terms import WindowTurbulence, predicted_terms, vane_loss
+from wind_sensors.estimation.bias_terms import (
+    WindowTurbulence,
+    array_terms,
+    predicted_terms,
+    vane_loss,
+)
 from wind_sensors.estimation.constants import is_array, measures_vertical
 from wind_sensors.estimation.core import Estimates, SmallScales
 from wind_sensors.estimation.intake import Block
@@ -162,13 +167,14 @@ class WindowAccumulator:
             mean_rate = run.interval_turned / run.interval_time
             offset = self._counter.starting_speed / length
             arithmetic = (run.rates / run.intervals + offset) / (mean_rate + offset) - 1.0
-        terms = predicted_terms(rotor, vane, state, arithmetic)
         covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
         if vane is None:
             seen, loss = 1.0 - float(np.sum(np.square(s.pointing / s.count))), 0.0
+            terms = array_terms(state, float(np.hypot(wind_run[0], wind_run[1])))
         else:
             seen = 1.0 - float(np.sum(np.square(run.directions))) / max(run.turned, 1e-9) ** 2
             loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
+            terms = predicted_terms(rotor, vane, state, arithmetic)
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
         across_variance = float(across_direction @ covariance @ across_direction)
         independent = max(duration / _CORRELATION_TIME / 10.0, 1.0)
