@@ -79,13 +79,6 @@ def measures_vertical(station: Station) -> bool:
     return bool(axes.size) and int(np.linalg.matrix_rank(axes, tol=0.05)) == 3
 
 
-def sensor_yaw(station: Station) -> float:
-    """Heading of the sensor's x axis against ENU (mast) or the platform's x axis [rad]."""
-    if station.platform is None:
-        return float(np.radians(station.sensor_heading_deg))
-    return float(np.radians(station.platform.sensor_rotation_deg[2]))
-
-
 def _mounting(rotor: Rotor, vanes: tuple[Vane, ...]) -> list[float]:
     if isinstance(rotor, Propeller) and rotor.mounted_on:
         carrier = [v.name for v in vanes].index(rotor.mounted_on)
@@ -110,17 +103,15 @@ def instruments_of(station: Station) -> Instruments:
     most = max([len(i.wake_shadows) for i in every], default=0)
     shadow = np.zeros((count, max(most, 1), 3))
     shadow[:, :, 2] = 1.0
-    distortion = np.zeros((count, 4))
+    distortion = np.zeros((count, 5))
     lean = np.zeros((count, 3, 3))
     plain = np.zeros(count, dtype=np.int64)
-    yaw = sensor_yaw(station)
-    north = 0.5 * np.pi if station.platform is None else 0.0
     for k, instrument in enumerate(every):
         for j, wake in enumerate(instrument.wake_shadows):
-            centre = north - np.radians(wake.bearing_from_deg) - yaw
-            shadow[k, j] = centre, wake.depth, np.radians(wake.width_deg)
+            centre, width = np.radians((wake.bearing_from_deg, wake.width_deg))
+            shadow[k, j] = centre, wake.depth, width
         d = instrument.flow_distortion
-        distortion[k] = d.cosine_1, d.sine_1, d.cosine_2, d.sine_2
+        distortion[k] = d.cosine_1, d.sine_1, d.cosine_2, d.sine_2, d.deflection
         tilt = instrument.tilt_deg
         if isinstance(instrument, Propeller) and instrument.mounted_on:
             carrier = next(v for v in vanes if v.name == instrument.mounted_on)

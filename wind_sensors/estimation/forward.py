@@ -58,7 +58,8 @@ class Instruments(NamedTuple):
         azimuth: For the elevation of a bivane the index of its azimuth, else -1; shape (vanes,).
         shadow: Wake shadows of rotors then vanes: bearing of its middle against x [rad], depth,
             width [rad]; shape (rotors + vanes, shadows, 3).
-        distortion: cos, sin, cos 2, sin 2 of the speed-up; shape (rotors + vanes, 4).
+        distortion: cos, sin, cos 2, sin 2 of the speed-up, deflection; shape
+            (rotors + vanes, 5).
         lean: Matrices that turn instrument axes into sensor axes, shape (rotors + vanes, 3, 3).
         plain: 1 where neither shadow nor distortion nor lean changes the wind.
     """
@@ -87,9 +88,10 @@ def rotor_of(s: Instruments, i: int) -> RotorParameters:
 
 @compiled
 def vane_of(s: Instruments, i: int) -> VaneParameters:
-    """Constants of vane i."""
+    """Constants of vane i, its friction left to the filter's noise: a vane that sticks has no slope
+    that a filter could follow."""
     v = s.vane[i]
-    return VaneParameters(v[0], v[1], v[2], v[3], v[4], v[5], v[6])
+    return VaneParameters(v[0], v[1], v[2], v[3], 0.0, v[5], v[6])
 
 
 @compiled
@@ -123,16 +125,18 @@ def at_instrument(
             off /= s.shadow[which, k, 2]
             factor *= 1.0 - depth * math.exp(-0.5 * off * off)
     d = s.distortion[which]
-    factor *= (
-        1.0
-        + d[0] * math.cos(bearing)
-        + d[1] * math.sin(bearing)
-        + d[2] * math.cos(2.0 * bearing)
-        + d[3] * math.sin(2.0 * bearing)
-    )
+    c_1, s_1 = math.cos(bearing), math.sin(bearing)
+    c_2, s_2 = c_1 * c_1 - s_1 * s_1, 2.0 * c_1 * s_1
+    factor *= 1.0 + d[0] * c_1 + d[1] * s_1 + d[2] * c_2 + d[3] * s_2
     x *= factor
     y *= factor
     z *= factor
+    if d[4] != 0.0:
+        turn = -d[4] * (d[0] * s_1 - d[1] * c_1 + d[2] * s_2 - d[3] * c_2)
+        x, y = (
+            math.cos(turn) * x - math.sin(turn) * y,
+            math.sin(turn) * x + math.cos(turn) * y,
+        )
     m = s.lean[which]
     return (
         m[0, 0] * x + m[1, 0] * y + m[2, 0] * z,

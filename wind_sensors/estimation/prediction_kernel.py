@@ -234,6 +234,9 @@ def _add_model_noise(p: FloatArray, s: Instruments, speed: float, dt: float) -> 
         j = WIND_STATES + 2 * (rotors + v) + 1
         omega = max(speed, _CALM) / s.vane[v, 0]
         p[j, j] += 2.0 * dt * _MODEL_ERROR * _MODEL_ERROR * omega * omega * omega
+        length = s.vane[v, 0]
+        stuck = s.vane[v, 4] / (length * length * s.vane[v, 2])
+        p[j, j] += 2.0 * dt * stuck * stuck / omega
 
 
 @compiled

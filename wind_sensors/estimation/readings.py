@@ -12,6 +12,9 @@ from wind_sensors.station.model import Angle
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
+_REPEATED = 20.0
+"""Readings inside a gap repeat one another: so many count as one."""
+
 
 class Headings(NamedTuple):
     """Usable readings: time [ns], heading [rad], variance beyond the usual noise [rad^2]."""
@@ -53,11 +56,14 @@ def headings(vane: Angle, time: TimeArray, reading: FloatArray, origin: int) -> 
         tolerance = 0.5 * np.radians(vane.quantisation_deg) + 1e-6
         if vane.gap_reading_deg is None:
             inside = np.abs(off) <= 0.5 * width + tolerance
+            # The nearer edge is shown: the nose is in that half of the gap.
+            middle, reach = centre + 0.25 * width * np.sign(off), 0.5 * width
         else:
             shown = _wrapped(angle - np.radians(vane.gap_reading_deg))
             inside = (np.abs(shown) <= tolerance) | (np.abs(off) < 0.5 * width - tolerance)
-        angle = np.where(inside, centre, angle)
-        extra = np.where(inside, width * width / 12.0, extra)
+            middle, reach = np.full_like(angle, centre), width
+        angle = np.where(inside, middle, angle)
+        extra = np.where(inside, _REPEATED * reach * reach / 12.0, extra)
     angle = _wrapped(angle - np.radians(vane.offset_deg))
     amplitude = np.radians(vane.eccentricity_deg)
     if amplitude != 0.0:
