@@ -4,7 +4,7 @@ VENV := .venv/bin
 
 .PHONY: demo test lint environment
 demo: environment
-	$(VENV)/wind demo
+	$(VENV)/wind demo --force
 
 test: environment
 	$(VENV)/python -m pytest

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,8 +25,9 @@ PAGE = "demo.html"
 _AFTER_THE_LAST_WINDOW = 5.0
 """Simulated seconds after which every window of the hour is final."""
 
+_MEAN_SPEED = 9.0
 _WIND: dict[str, Value] = {
-    "mean_speed": 9.0,
+    "mean_speed": _MEAN_SPEED,
     "direction_from": 240.0,
     "intensity": 0.22,
     "integral_length": 80.0,
@@ -158,7 +160,7 @@ def _live_hour(args: argparse.Namespace, folder: Path, progress: Progress) -> Ci
     progress.update(task, total=seconds, completed=seconds)
     return Circumstances(
         _WORDS, args.duration, live.wall_seconds, sum(live.counts.values()),
-        ("sim_node", "cup_vane_node"),
+        ("sim_node", "cup_vane_node"), _corner_frequency(folder / STATION_FILE),
     )  # fmt: skip
 
 
@@ -180,6 +182,16 @@ def _offline_hour(args: argparse.Namespace, folder: Path, progress: Progress) ->
         progress=lambda done: progress.update(task, completed=done),
     )
     write_recording(folder / RECORDING, recording)
+    corner = _corner_frequency(folder / STATION_FILE)
     messages = sum(len(p.time) for p in recording.pulses.values())
     messages += sum(len(a.time) for a in recording.angles.values())
-    return Circumstances(_WORDS, args.duration, 0.0, messages, ())
+    return Circumstances(_WORDS, args.duration, 0.0, messages, (), corner)
+
+
+def _corner_frequency(station_file: Path) -> float:
+    """Mean speed over 2 pi distance constants of the first cup [Hz]."""
+    from wind_sensors.recordings import load_station
+    from wind_sensors.station.model import Cup
+
+    cups = [i for i in load_station(station_file).instruments if isinstance(i, Cup)]
+    return _MEAN_SPEED / (2.0 * math.pi * cups[0].distance_constant)

@@ -19,7 +19,7 @@ Drawing = Callable[[DemoResults, Figure], None]
 
 WIDE = 9.6
 NARROW = 4.4
-_EXCERPT_SECONDS = 40.0
+_EXCERPT_SECONDS = 16.0
 _BAND = float(norm.ppf(0.95))
 
 

@@ -18,6 +18,7 @@ class Circumstances(NamedTuple):
         wall_seconds: How long the live graph ran; 0 without one.
         messages: Messages recorded.
         processes: Names of the live processes.
+        corner_frequency: Where the cup's response has fallen to one half in variance [Hz].
     """
 
     wind: str
@@ -25,6 +26,7 @@ class Circumstances(NamedTuple):
     wall_seconds: float
     messages: int
     processes: tuple[str, ...]
+    corner_frequency: float
 
 
 _STYLE = """
@@ -39,7 +41,8 @@ p{margin:0 0 .8rem;max-width:44rem}.lead{font-size:1.1rem;color:var(--muted)}
 .numbers{display:grid;gap:.8rem;grid-template-columns:repeat(auto-fit,minmax(13rem,1fr));
 margin:1.6rem 0}
 .number,section{background:#fff;border:1px solid var(--line);border-radius:14px}
-.number{padding:1rem 1.15rem}.number b{display:block;font-size:1.9rem;line-height:1.15;
+.number{padding:1rem 1.15rem}
+.number b{display:block;font-size:1.4rem;line-height:1.2;white-space:nowrap;
 letter-spacing:-.02em;font-variant-numeric:tabular-nums}
 .number>span{color:var(--muted);font-size:.92rem;line-height:1.35;display:block;margin-top:.25rem}
 section{padding:1.4rem 1.4rem 1rem;margin:0 0 1.2rem}
@@ -48,14 +51,14 @@ figure{margin:.6rem 0 .4rem}svg{display:block;width:100%;height:auto}
 svg text{font-family:system-ui,-apple-system,"Segoe UI",sans-serif!important}
 .narrow{display:none}
 .scroll{overflow-x:auto}table{border-collapse:collapse;width:100%;font-size:.93rem}
-th,td{padding:.4rem .7rem;text-align:right;border-bottom:1px solid var(--line);
+th,td{padding:.4rem .5rem;text-align:right;border-bottom:1px solid var(--line);
 font-variant-numeric:tabular-nums;white-space:nowrap}
 th{color:var(--muted);font-weight:600}th:first-child,td:first-child{text-align:left;padding-left:0}
 footer{color:var(--muted);font-size:.9rem;margin-top:2rem}
 code{font:.92em ui-monospace,monospace;background:#eef2f5;border-radius:5px;padding:.1em .35em}
 @media(max-width:640px){body{font-size:16px}main{padding:1.5rem .8rem 3rem}
 section{padding:1.1rem .9rem .7rem}.wide{display:none}.narrow{display:block}
-.numbers{grid-template-columns:1fr 1fr}.number b{font-size:1.45rem}.number{padding:.8rem .85rem}}
+.numbers{grid-template-columns:1fr 1fr}.number b{font-size:1.25rem}.number{padding:.8rem .85rem}}
 """
 
 
@@ -95,9 +98,10 @@ def demo_page(results: DemoResults, run: Circumstances) -> str:
         ),
         _section(
             "What was lost, frequency by frequency",
-            "Above a tenth of a hertz the cup no longer follows. The corrected wind keeps the "
-            "true spectrum further up, and fades where the pulses carry no information rather "
-            "than invent it.",
+            f"The cup follows the wind up to about {run.corner_frequency:.1f} Hz (mean speed over "
+            "2π distance constants) and then falls behind. The corrected wind keeps to the true "
+            "spectrum further up, and fades where the pulses carry no information rather than "
+            "invent it.",
             _figure(spectra, results, 3.8, 3.8),
         ),
         _live_section(results.agreement, run),
@@ -174,7 +178,7 @@ def _window_table(windows: tuple[WindowComparison, ...]) -> str:
     return (
         "<div class='scroll'><table><thead><tr><th>window</th><th>true [m/s]</th>"
         "<th>raw</th><th>corrected</th><th>bias predicted [%]</th><th>found [%]</th>"
-        "<th>from [°], true / corrected</th></tr></thead>"
+        "<th>from [°]: true / corr.</th></tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
 

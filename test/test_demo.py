@@ -1,0 +1,147 @@
+"""The demo: its comparisons on known numbers, and the whole of it on a short hour."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wind_sensors.estimation.outputs import BiasTerm, ProcessedRecording, WindowStatistics
+from wind_sensors.recordings import load_station, write_recording
+from wind_sensors.report.demo_page import Circumstances, demo_page
+from wind_sensors.report.demo_results import DemoResults, demo_results, live_agreement
+from wind_sensors.station.signals import FloatArray, Recording, Winds
+
+SECONDS = 300
+START = 1_800_000_000 * 10**9
+
+
+def _processed(error: FloatArray, method: str) -> ProcessedRecording:
+    """Estimates with known errors of a wind that blows to the north-east and back."""
+    seconds = np.arange(0.0, SECONDS, 0.05)
+    time = START + np.rint(seconds * 1e9).astype(np.int64)
+    speed = 8.0 + np.sin(seconds)
+    true = np.stack([0.6 * speed, 0.8 * speed, 0.0 * speed], axis=1)
+    recording = Recording(
+        name="made up", station=load_station("mast_cup_vane"), start=START,
+        stop=int(time[-1]), truth=Winds(time, true),
+    )  # fmt: skip
+    covariance = np.tile(np.diag([0.04, 0.04, 1.0]), (len(time), 1, 1))
+    velocity = true + error
+    window = _window(true)
+    return ProcessedRecording(
+        recording=recording, method=method, time=time, velocity=velocity, covariance=covariance,
+        apparent=velocity, apparent_covariance=covariance,
+        to_earth=np.tile(np.eye(3), (len(time), 1, 1)), windows=(window,), health=(),
+    )  # fmt: skip
+
+
+def _window(true: FloatArray) -> WindowStatistics:
+    stop = START + (SECONDS - 1) * 10**9
+    inside = true[: 20 * (SECONDS - 1)]
+    mean = inside.mean(axis=0)
+    speed = float(np.hypot(mean[0], mean[1]))
+    return WindowStatistics(
+        start=START, stop=stop, complete=1.0, wind_run_mean=mean[:2] * 1.02, vector_mean=mean,
+        vector_mean_covariance=np.eye(3) * 1e-4, bias=0.02 * mean, bias_covariance=np.eye(3) * 0.0,
+        raw_scalar_mean=1.02 * speed, scalar_mean=speed, scalar_mean_uncertainty=0.01,
+        direction=0.9, direction_uncertainty=0.0, direction_variance=0.0,
+        corrected_direction_variance=0.0, direction_variance_uncertainty=0.0,
+        turbulence=np.zeros(3), instrument="cup",
+        bias_terms={"u": BiasTerm(0.005, 0.003), "v": BiasTerm(0.014, 0.004),
+                    "arithmetic_mean": BiasTerm(0.5, 0.0)},
+    )  # fmt: skip
+
+
+def _noise(scale: float, seed: int) -> FloatArray:
+    drawn = scale * np.random.default_rng(seed).standard_normal((SECONDS * 20, 3))
+    return np.asarray(drawn)
+
+
+@pytest.fixture(scope="module")
+def results() -> DemoResults:
+    return demo_results(_processed(_noise(0.2, 1), "kalman"), _processed(_noise(0.6, 2), "naive"),
+                        None)  # fmt: skip
+
+
+def test_errors_and_coverage_are_those_that_were_put_in(results: DemoResults) -> None:
+    assert results.corrected_error == pytest.approx(0.2 * np.sqrt(2.0), rel=0.03)
+    assert results.naive_error == pytest.approx(0.6 * np.sqrt(2.0), rel=0.03)
+    assert results.coverage == pytest.approx(0.9, abs=0.015)
+
+
+def test_biases_are_compared_term_by_term_without_that_of_another_mean(
+    results: DemoResults,
+) -> None:
+    (window,) = results.windows
+    assert window.predicted_bias == pytest.approx(0.019)
+    assert window.predicted_uncertainty == pytest.approx(0.005)
+    assert window.found_bias == pytest.approx(0.02, abs=1e-6)
+
+
+def test_live_agreement_sees_one_changed_bit(tmp_path: Path) -> None:
+    offline = _processed(_noise(0.2, 1), "kalman")
+    write_recording(tmp_path / "live", offline.recording, outputs=offline)
+    same = live_agreement(tmp_path / "live", offline)
+    assert same.is_exact
+    assert same.compared == len(offline.time)
+    velocity = offline.velocity.copy()
+    velocity[100, 0] = np.nextafter(velocity[100, 0], 100.0)
+    changed = live_agreement(tmp_path / "live", replace(offline, velocity=velocity))
+    assert not changed.is_exact
+    assert 0.0 < changed.largest_difference < 1e-14
+
+
+class _Outside(HTMLParser):
+    """Collects what a page would fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fetched: list[str] = []
+        self.identifiers: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name in {"src", "href", "xlink:href"} and value and not value.startswith("#"):
+                self.fetched.append(value)
+            if name == "id" and value:
+                self.identifiers.append(value)
+
+
+def test_the_page_is_self_contained_and_its_figures_do_not_mix(results: DemoResults) -> None:
+    page = demo_page(results, Circumstances("wind", 300.0, 0.0, 1234, (), 0.8))
+    parser = _Outside()
+    parser.feed(page)
+    assert parser.fetched == []
+    assert len(parser.identifiers) == len(set(parser.identifiers))
+    used = set(re.findall(r'(?:xlink:href="|url\()#([^")]+)', page))
+    assert used <= set(parser.identifiers)
+    assert page.count("<svg") == 6
+    assert "There is no rclpy" in page
+
+
+def test_the_demo_runs_live_and_finds_the_same_numbers_offline(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    process = subprocess.run(
+        [sys.executable, "-m", "wind_sensors.cli", "demo", "-o", str(tmp_path / "out"),
+         "--duration", "120", "--rate", "30"],
+        env=os.environ | {"ROS_LOG_DIR": str(tmp_path)}, capture_output=True, text=True,
+        timeout=300, check=False,
+    )  # fmt: skip
+    assert process.returncode == 0, process.stdout + process.stderr
+    assert "largest difference 0\n" in process.stdout
+    page = (tmp_path / "out" / "demo.html").read_text(encoding="utf-8")
+    assert "to the last bit" in page
+    again = subprocess.run(
+        [sys.executable, "-m", "wind_sensors.cli", "demo", "-o", str(tmp_path / "out")],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert again.returncode == 2
+    assert "exists already" in again.stderr
