@@ -360,3 +360,18 @@ def test_felt_gravity_is_the_plumb_line_of_a_swing():
     np.testing.assert_allclose(
         felt, np.tile((g * np.sin(0.2), 0.0, -g * np.cos(0.2)), (5, 1)), atol=1e-9
     )
+
+
+@given(vectors, attitudes, angles)
+def test_the_wind_along_the_platforms_axes_is_the_felt_wind_and_the_motion(wind, q, yaw):
+    """R^T wind = S apparent + velocity, whichever way the sensor is mounted."""
+    platform = Platform(sensor_rotation_deg=(3.0, -2.0, float(np.degrees(yaw))))
+    rotation = relative_wind.sensor_rotation(platform)
+    motion = motion_at(q, velocity=(4.0, -1.0, 0.3))
+    felt = relative_wind.apparent_wind(wind[np.newaxis], motion, np.zeros(3), rotation)
+    spread = np.diag((1.0, 2.0, 3.0))
+    along, covariance = relative_wind.wind_in_platform(
+        wind, spread, motion.to_earth[0] @ rotation, rotation
+    )
+    np.testing.assert_allclose(along, rotation @ felt[0] + (4.0, -1.0, 0.3), atol=1e-9)
+    assert along @ covariance @ along == pytest.approx(wind @ spread @ wind, rel=1e-6, abs=1e-6)

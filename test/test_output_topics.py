@@ -85,6 +85,7 @@ def test_estimates_become_the_documented_output_topics(tmp_path: Path) -> None:
         covariance=covariance,
         apparent=rng.normal(size=(20, 3)),
         apparent_covariance=covariance,
+        to_earth=np.tile(np.eye(3), (20, 1, 1)),
         windows=(window(START, 7.0), window(START + 600_000_000_000, 8.0)),
         health=(HealthItem("cup", HealthLevel.WARN, "slow", {"rate": "3 Hz"}),),
     )
@@ -107,5 +108,6 @@ def test_estimates_become_the_documented_output_topics(tmp_path: Path) -> None:
     assert types["/wind/vector"] == "geometry_msgs/msg/Vector3Stamped"
     (status,) = typestore().deserialize_cdr(raw, types["/diagnostics"]).status
     assert (status.name, status.message, int(status.level)) == ("cup", "slow", 1)
+    assert "/wind/body" not in types
     again = read_recording(folder)
     assert np.array_equal(again.pulses["cup"].time, recording.pulses["cup"].time)

@@ -42,14 +42,15 @@ def array_estimates(
         times: [ns], shape (n,).
         apparent: [m/s], shape (n, 3).
         variance: Of every component [m^2/s^2], shape (n,).
-        rows: Circumstances, shape (n, 22).
+        rows: Circumstances, shape (n, 23).
     """
     to_earth = rows[:, MOUNT_ROTATION : MOUNT_ROTATION + 9].reshape(-1, 3, 3)
     velocity = np.einsum("nij,nj->ni", to_earth, apparent) + rows[:, :3]
     covariance = variance[:, np.newaxis, np.newaxis] * np.eye(3)
     return Estimates(
-        times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, covariance
-    )
+        times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, covariance,
+        to_earth,
+    )  # fmt: skip
 
 
 class _ArrayCore:

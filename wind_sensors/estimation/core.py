@@ -23,6 +23,7 @@ class Estimates(NamedTuple):
         covariance: [m^2/s^2], shape (n, 3, 3).
         apparent: Sensor frame [m/s], shape (n, 3).
         apparent_covariance: [m^2/s^2], shape (n, 3, 3).
+        to_earth: Matrices that turn the sensor's axes into ENU, shape (n, 3, 3).
     """
 
     time: TimeArray
@@ -30,6 +31,7 @@ class Estimates(NamedTuple):
     covariance: FloatArray
     apparent: FloatArray
     apparent_covariance: FloatArray
+    to_earth: FloatArray
 
 
 class SmallScales(NamedTuple):
@@ -67,6 +69,7 @@ def no_estimates() -> Estimates:
         np.empty((0, 3, 3)),
         np.empty((0, 3)),
         np.empty((0, 3, 3)),
+        np.empty((0, 3, 3)),
     )
 
 
@@ -81,6 +84,7 @@ def trusted(estimates: Estimates) -> Estimates:
         estimates.covariance[known],
         estimates.apparent[known],
         estimates.apparent_covariance[known],
+        estimates.to_earth[known],
     )
 
 

@@ -62,8 +62,9 @@ def earth_estimates(
     velocity = np.einsum("nij,nj->ni", to_earth, apparent) + rows[:, :3]
     covariance = np.einsum("nij,njk,nlk->nil", to_earth, in_sensor, to_earth)
     return Estimates(
-        times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor
-    )
+        times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor,
+        to_earth,
+    )  # fmt: skip
 
 
 class NaiveCore:

@@ -25,6 +25,7 @@ class WindEstimate(NamedTuple):
         covariance: Of `velocity` [m^2/s^2], shape (3, 3).
         apparent: Wind minus the sensor's velocity, in the sensor frame (x, y, z) [m/s], shape (3,).
         apparent_covariance: Of `apparent` [m^2/s^2], shape (3, 3).
+        to_earth: Matrix that turns the sensor's axes into ENU, shape (3, 3).
     """
 
     time: int
@@ -32,6 +33,7 @@ class WindEstimate(NamedTuple):
     covariance: FloatArray
     apparent: FloatArray
     apparent_covariance: FloatArray
+    to_earth: FloatArray
 
 
 class BiasTerm(NamedTuple):
@@ -128,6 +130,7 @@ class ProcessedRecording:
         covariance: [m^2/s^2], shape (n, 3, 3).
         apparent: In the sensor frame [m/s], shape (n, 3).
         apparent_covariance: [m^2/s^2], shape (n, 3, 3).
+        to_earth: Matrices that turn the sensor's axes into ENU, shape (n, 3, 3).
         windows: Window statistics in order.
         health: Health at the end of the recording.
     """
@@ -139,5 +142,6 @@ class ProcessedRecording:
     covariance: FloatArray
     apparent: FloatArray
     apparent_covariance: FloatArray
+    to_earth: FloatArray
     windows: tuple[WindowStatistics, ...]
     health: tuple[HealthItem, ...]

@@ -138,6 +138,7 @@ def process(
         covariance=found.covariance,
         apparent=found.apparent,
         apparent_covariance=found.apparent_covariance,
+        to_earth=found.to_earth,
         windows=tuple(windows),
         health=tuple(estimator.health()),
     )

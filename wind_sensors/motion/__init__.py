@@ -7,6 +7,7 @@ from wind_sensors.motion.relative_wind import (
     earth_wind,
     earth_wind_covariance,
     sensor_rotation,
+    wind_in_platform,
 )
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "reported_motion",
     "sensor_rotation",
     "true_motion",
+    "wind_in_platform",
 ]

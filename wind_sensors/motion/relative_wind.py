@@ -64,6 +64,32 @@ def earth_wind(
     return wind
 
 
+def wind_in_platform(
+    wind: npt.ArrayLike, covariance: npt.ArrayLike, to_earth: FloatArray, rotation: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The earth wind seen along the platform's axes: x forward, y left, z up.
+
+    Args:
+        wind: ENU [m/s], shape (..., 3).
+        covariance: Its covariance [m^2/s^2], shape (..., 3, 3).
+        to_earth: Matrices that turn sensor axes into ENU, shape (..., 3, 3).
+        rotation: S, from `sensor_rotation`.
+
+    Returns:
+        Wind [m/s], shape (..., 3), and covariance [m^2/s^2], shape (..., 3, 3). Errors of the
+        attitude stay in the covariance, although some of them cancel in these axes.
+    """
+    platform_to_earth = to_earth @ rotation.T
+    turned = np.einsum("...ji,...j->...i", platform_to_earth, np.asarray(wind, dtype=np.float64))
+    spread = np.einsum(
+        "...ji,...jk,...kl->...il",
+        platform_to_earth,
+        np.asarray(covariance, dtype=np.float64),
+        platform_to_earth,
+    )
+    return turned, spread
+
+
 def _cross_matrix(vector: FloatArray) -> FloatArray:
     """Matrices [v] with [v] a = v x a; shape (n, 3) to (n, 3, 3)."""
     out = np.zeros((*vector.shape[:-1], 3, 3))

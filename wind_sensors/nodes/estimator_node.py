@@ -169,6 +169,13 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         changeable=True,
     ),
     Parameter(
+        "body_frame_id",
+        str,
+        "base_link",
+        "Frame of wind/body, the platform's: x forward, y left, z up.",
+        changeable=True,
+    ),
+    Parameter(
         "nmea",
         bool,
         False,
@@ -267,9 +274,7 @@ class EstimatorNode(Node):
         self._estimator = make_estimator(self.station, settings)
         warm_up(self.station, settings)
         self._inputs = EstimatorInputs(self.station, self._estimator, self._now)
-        platform = self.station.platform
-        declination = None if platform is None else platform.magnetic_declination_deg
-        self._outputs = WindPublishers(self, declination)
+        self._outputs = WindPublishers(self, self.station.platform)
         self._apply_publishing()
         self.received_at = time.monotonic()
         self._idle_checks = 0
@@ -384,6 +389,7 @@ class EstimatorNode(Node):
         publishers, values = self._outputs, self._values
         publishers.frame_id = str(values["frame_id"])
         publishers.sensor_frame_id = str(values["sensor_frame_id"])
+        publishers.body_frame_id = str(values["body_frame_id"])
         publishers.nmea_talker = str(values["nmea_talker"]) if values["nmea"] else ""
         publishers.nmea_period = round(_SECOND / _number(values["nmea_rate"]))
 

@@ -10,6 +10,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistWithCovarianceStamped, Vector3Stamped
 from std_msgs.msg import Float64, String
 
+from wind_sensors.motion import sensor_rotation, wind_in_platform
 from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.nodes.nmea import apparent_wind_sentence, true_wind_sentence
 from wind_sensors.nodes.quality import advertise, output_quality
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from rclpy.publisher import Publisher
 
     from wind_sensors.estimation.outputs import WindEstimate, WindowStatistics
+    from wind_sensors.station.model import Platform
     from wind_sensors.station.signals import FloatArray
 
 _SECOND = 1_000_000_000
@@ -29,6 +31,7 @@ BIAS_TERMS = ("u", "v", "w", "vane_lag", "translation", "arithmetic_mean")
 TOPICS: dict[str, str] = {
     "wind": "TwistWithCovarianceStamped: corrected wind velocity, where the air goes, ENU",
     "wind/apparent": "TwistWithCovarianceStamped: wind minus sensor velocity, sensor frame",
+    "wind/body": "TwistWithCovarianceStamped: `wind` along the axes of a moving platform",
     "wind/vector": "Vector3Stamped: `wind` without covariance, for plots",
     "wind/mean": "TwistWithCovarianceStamped: corrected vector mean of each window",
     "wind/speed": "Float64: corrected scalar mean speed of each window [m/s]",
@@ -52,25 +55,28 @@ class WindPublishers:
 
     Args:
         node: Its namespace is the station's.
-        declination_deg: Magnetic declination for NMEA sentences; None where it is not known.
+        platform: The carrier; None on a mast.
 
     Attributes:
         frame_id: Of earth-fixed vectors.
         sensor_frame_id: Of the apparent wind.
+        body_frame_id: Of the wind along the platform's axes.
         nmea_talker: Two letters; empty: no sentences.
         nmea_period: Between sentences [ns].
     """
 
-    def __init__(self, node: Node, declination_deg: float | None) -> None:
+    def __init__(self, node: Node, platform: Platform | None) -> None:
         self.frame_id = "map"
         self.sensor_frame_id = "wind_sensor"
+        self.body_frame_id = "base_link"
         self.nmea_talker = ""
         self.nmea_period = _SECOND
         self._node = node
-        self._declination_deg = declination_deg
+        self._platform = platform
         twist = TwistWithCovarianceStamped
         self._wind = self._advertise(twist, "wind")
         self._apparent = self._advertise(twist, "wind/apparent")
+        self._body = None if platform is None else self._advertise(twist, "wind/body")
         self._vector = self._advertise(Vector3Stamped, "wind/vector")
         self._mean = self._advertise(twist, "wind/mean")
         self._speed = self._advertise(Float64, "wind/speed")
@@ -85,13 +91,19 @@ class WindPublishers:
         return advertise(self._node, message_type, topic, output_quality())
 
     def publish_estimates(self, estimates: Iterable[WindEstimate]) -> None:
-        """`wind`, `wind/apparent`, `wind/vector` and NMEA sentences."""
+        """`wind`, `wind/apparent`, `wind/body`, `wind/vector` and NMEA sentences."""
         for estimate in estimates:
             time = stamp(estimate.time)
             self._wind.publish(_twist(time, self.frame_id, estimate.velocity, estimate.covariance))
             self._apparent.publish(
                 _twist(time, self.sensor_frame_id, estimate.apparent, estimate.apparent_covariance)
             )
+            if self._body is not None and self._platform is not None:
+                along, spread = wind_in_platform(
+                    estimate.velocity, estimate.covariance, estimate.to_earth,
+                    sensor_rotation(self._platform),
+                )  # fmt: skip
+                self._body.publish(_twist(time, self.body_frame_id, along, spread))
             vector = Vector3Stamped()
             vector.header.stamp = time
             vector.header.frame_id = self.frame_id
@@ -122,9 +134,10 @@ class WindPublishers:
         if self._nmea is None:
             self._nmea = self._advertise(String, "wind/nmea")
         talker = self.nmea_talker
+        declination = None if self._platform is None else self._platform.magnetic_declination_deg
         for text in (
             apparent_wind_sentence(estimate.apparent, talker),
-            true_wind_sentence(estimate.velocity, self._declination_deg, talker),
+            true_wind_sentence(estimate.velocity, declination, talker),
         ):
             self._nmea.publish(String(data=text))
 

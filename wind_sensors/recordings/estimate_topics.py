@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.typesys.store import Typestore
 
+from wind_sensors.motion import sensor_rotation, wind_in_platform
 from wind_sensors.motion.frames import direction_from_deg
-from wind_sensors.recordings.raw_topics import running_time
+from wind_sensors.recordings.raw_topics import BODY_FRAME, running_time
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.station.inputs import FieldPath
 from wind_sensors.station.signals import FloatArray, TimeArray
@@ -29,8 +30,8 @@ def estimate_topics(
 ) -> list[TopicMessages]:
     """Output topics of one processed recording.
 
-    Wind vectors say where the air goes, in ENU (`wind`, `wind/mean`, `wind/bias`, `wind/vector`)
-    or in the sensor's frame (`wind/apparent`).
+    Wind vectors say where the air goes, in ENU (`wind`, `wind/mean`, `wind/bias`, `wind/vector`),
+    in the sensor's frame (`wind/apparent`) or, on a platform, along its axes (`wind/body`).
 
     Args:
         processed: What the estimator found.
@@ -60,6 +61,12 @@ def estimate_topics(
         if len(time)
         else TopicMessages(f"{base}/vector", VECTOR, time, []),
     ]
+    platform = processed.recording.station.platform
+    if platform is not None:
+        along, spread = wind_in_platform(
+            velocity, processed.covariance, processed.to_earth, sensor_rotation(platform)
+        )
+        found.append(_twists(types, f"{base}/body", BODY_FRAME, time, along, spread))
     found += _window_topics(types, base, frame, processed.windows)
     found.append(_diagnostics(types, processed, f"{namespace}/diagnostics"))
     return [topic for topic in found if len(topic.raw)]
