@@ -29,8 +29,8 @@ from wind_sensors.recordings.bag import read_bag
 from wind_sensors.simulation.run import simulate
 from wind_sensors.station.signals import Recording
 
-DURATION = 30.0
-SPEED = 25.0
+DURATION = 16.0
+SPEED = 20.0
 SEED = 5
 
 
@@ -115,7 +115,9 @@ def _offline_simulation(station_name: str, start: int) -> Recording:
     return simulate(station, scenario, start=start)
 
 
-@pytest.mark.parametrize("station", ["mast_cup_vane", "mast_propeller_vane", "usv"])
+@pytest.mark.parametrize(
+    "station", ["mast_cup_vane", "mast_propeller_vane", "usv", "propeller_array", "bivane"]
+)
 def test_live_equals_offline_to_the_bit(graph: Graph, tmp_path: Path, station: str) -> None:
     run = LiveRun(graph, tmp_path / "recording", station)
     run.assert_live_equals_offline()
@@ -145,7 +147,7 @@ def test_transport_faults_are_survived_told_and_repeated_offline(
     run.assert_live_equals_offline()
     assert int(values(run.status("vane"))["doubled"]) > 20
     topic = run.status("topic /vane/joint_states")
-    assert int(values(topic)["not numbers"]) > 10
+    assert int(values(topic)["not numbers"]) > 5
     assert topic.level == b"\x01"
     _, velocity, _ = stamps_and_velocities(run.wind)
     truth = run.recording.truth
@@ -160,7 +162,7 @@ def test_transport_faults_are_survived_told_and_repeated_offline(
 def test_a_clock_that_jumps_back_is_reported_and_the_wind_goes_on(
     graph: Graph, tmp_path: Path
 ) -> None:
-    faults = {"faults.clock_jump_at": 15.0, "faults.clock_jump": -1000.0}
+    faults = {"faults.clock_jump_at": 8.0, "faults.clock_jump": -1000.0}
     run = LiveRun(graph, tmp_path / "recording", "mast_cup_vane", **faults)
     clock = run.status("clock")
     assert values(clock)["jumps"] == "1"
@@ -168,7 +170,7 @@ def test_a_clock_that_jumps_back_is_reported_and_the_wind_goes_on(
     time, _, _ = stamps_and_velocities(run.wind)
     steps = np.diff(time)
     assert np.count_nonzero(steps < 0) == 1
-    assert np.count_nonzero(time < time[0]) > 200
+    assert np.count_nonzero(time < time[0]) > 100
     run.assert_live_equals_offline()
 
 
@@ -193,7 +195,8 @@ def test_a_counter_that_wraps_gives_the_wind_of_single_edges(graph: Graph, tmp_p
         _offline_simulation("mast_cup_vane", run.recording.start), EstimatorSettings()
     )
     difference = velocity[:, :2] - from_edges.velocity[:, :2]
-    assert np.sqrt(np.mean(difference[100:] ** 2)) < 0.1
+    # At the very end an edge that did not come tells more than a count that did not change.
+    assert np.sqrt(np.mean(difference[100:-40] ** 2)) < 0.02
 
 
 def test_a_looping_bag_makes_the_clock_jump_and_the_estimate_start_afresh(
@@ -221,7 +224,8 @@ def test_a_looping_bag_makes_the_clock_jump_and_the_estimate_start_afresh(
         loop=True,
         wait_for_subscribers=1,
     )
-    one_pass = 744
+    raw = read_bag(folder / "bag").topics
+    one_pass = len(raw["/cup/pulses"].raw) + len(raw["/vane/joint_states"].raw)
     graph.spin(lambda: player.published > 3 * one_pass)
 
     def jumped() -> bool:

@@ -122,6 +122,7 @@ class SimulatorNode(Node):
         self._duration = _number(values["duration"]) or math.inf
         self._scenario = scenario_of(values, self.station)
         self._begin = 0
+        self._end: int | None = None
         encoder = SignalEncoder(
             self.station, str(values["frame_id"]), with_truth=bool(values["publish_truth"])
         )
@@ -172,7 +173,7 @@ class SimulatorNode(Node):
         now = self._begin + round(self._elapsed * 1e9)
         while self._next_event.arrival <= now:
             event = self._next_event
-            if event.arrival >= self._begin + self._duration * 1e9:
+            if self._end is not None and event.arrival >= self._end:
                 break
             self._tell_time(event.arrival)
             for topic, message in self._encoder.encode(event):
@@ -214,6 +215,8 @@ class SimulatorNode(Node):
         stated = recording_start(self.station) if self._with_clock else 0
         # Zero means "no time" to ROS, so a station file that states no start begins now.
         self._begin = stated or time.time_ns()
+        if math.isfinite(self._duration):
+            self._end = self._begin + round(self._duration * 1e9)
         self._events = live_events(SignalStream(self.station, self._scenario, self._begin))
         self._next_event = next(self._events)
         self._next_clock = self._begin
