@@ -1,0 +1,134 @@
+"""Window statistics against direct sums, and the inverse equations against the forward ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from estimation_cases import blown, mast, truth_at
+
+from wind_sensors.estimation import EstimatorSettings, process
+from wind_sensors.estimation.inverse import (
+    forcing_from_motion,
+    local_parabola,
+    wind_heading_from_motion,
+)
+from wind_sensors.instruments.cup_vane import vector_wind_run
+from wind_sensors.instruments.dynamics.rotor import rotor_acceleration, rotor_forcing
+from wind_sensors.instruments.dynamics.vane import vane_acceleration
+from wind_sensors.instruments.pulses import mean_speed
+from wind_sensors.station.model import Cup, Propeller, Vane
+from wind_sensors.station.parameters import rotor_parameters, vane_parameters
+
+
+def test_raw_means_are_those_of_the_pulse_formulas() -> None:
+    station = mast({"starting_speed": 0.0})
+    recording = blown(station, duration=100.0)
+    window = process(recording, EstimatorSettings(window=200.0)).windows[0]
+    edges = (recording.pulses["cup"].time - recording.start) * 1e-9
+    direct = mean_speed(np.diff(edges), 0.14, 4.0)
+    assert window.raw_scalar_mean == pytest.approx(direct.count_mean, rel=0.004)
+    ratio = direct.arithmetic_mean / direct.count_mean - 1.0
+    assert window.bias_terms["arithmetic_mean"].value == pytest.approx(ratio, rel=0.01)
+    vane = recording.angles["vane"]
+    heading = np.interp(edges, (vane.time - recording.start) * 1e-9, np.unwrap(vane.angle))
+    duration = (window.stop - window.start) * 1e-9
+    run = vector_wind_run(heading + np.pi, duration, 0.14, 4.0)
+    assert np.hypot(*window.wind_run_mean) == pytest.approx(run.speed, rel=0.002)
+    assert np.arctan2(*window.wind_run_mean[::-1]) == pytest.approx(run.heading, abs=1e-3)
+
+
+def test_the_corrected_mean_is_closer_to_the_truth_than_the_raw_one() -> None:
+    station = mast({"mu2": 0.0, "distance_constant": 5.0})
+    recording = blown(station, speed=6.0, duration=300.0, intensity=0.25, seed=5)
+    found = process(recording, EstimatorSettings(window=300.0))
+    window = found.windows[0]
+    inside = (found.time > window.start) & (found.time < window.stop)
+    truth = truth_at(recording, found.time)[inside]
+    true_speed = float(np.hypot(truth[:, 0], truth[:, 1]).mean())
+    raw = window.raw_scalar_mean / true_speed - 1.0
+    corrected = window.scalar_mean / true_speed - 1.0
+    assert raw > 0.005
+    assert abs(corrected) < 0.5 * raw
+    assert abs(window.scalar_mean - true_speed) < 3.0 * window.scalar_mean_uncertainty
+    predicted = window.bias_terms["u"].value
+    assert raw == pytest.approx(predicted, abs=0.6 * raw)
+
+
+def test_direction_variance_is_corrected_towards_the_truth() -> None:
+    vane = {"distance_constant": 1.5, "damping_ratio": 1.2, "noise_deg": 0.0}
+    recording = blown(mast(vane=vane), speed=6.0, duration=200.0, seed=8)
+    window = process(recording, EstimatorSettings(window=200.0)).windows[0]
+    truth = truth_at(recording, np.arange(window.start, window.stop, 50_000_000))
+    unit = truth[:, :2] / np.hypot(truth[:, 0], truth[:, 1])[:, np.newaxis]
+    true = 1.0 - float(np.sum(np.square(unit.mean(axis=0))))
+    assert window.direction_variance < 0.9 * true
+    assert abs(window.corrected_direction_variance - true) < 0.5 * (
+        true - window.direction_variance
+    )
+
+
+CUP = rotor_parameters(mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0])  # type: ignore[arg-type]
+PROPELLER = rotor_parameters(
+    Propeller.model_validate(
+        {
+            "name": "p",
+            "pulses": {"topic": "p"},
+            "pulses_per_revolution": 2,
+            "calibration_distance": 0.05,
+            "distance_constant": 0.9,
+            "stall_speed": 0.2,
+        }
+    )
+)
+
+
+@pytest.mark.parametrize("speed", [1.5, 4.0, 12.0])
+@pytest.mark.parametrize("ratio", [0.8, 1.0, 1.1])
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_the_inverse_rotor_equation_gives_the_wind_back(
+    speed: float, ratio: float, angle: float
+) -> None:
+    y = ratio * speed
+    forcing, slope, lift = rotor_forcing(CUP, 0.0, speed, 0.0)
+    rate = rotor_acceleration(CUP, y, 0.0, forcing, slope, lift, 0.0, 1.04, 5.0)
+    assert forcing_from_motion(CUP, y, rate, 0.0, 1.04, 5.0) == pytest.approx(speed, rel=1e-9)
+    axial, transverse = speed * np.cos(angle), speed * np.sin(angle)
+    forcing, slope, lift = rotor_forcing(PROPELLER, axial, transverse, 0.0)
+    rate = rotor_acceleration(PROPELLER, y, 0.0, forcing, slope, lift, 0.0, 0.97, 5.0)
+    found = forcing_from_motion(PROPELLER, y, rate, angle, 0.97, 5.0)
+    assert found == pytest.approx(speed, rel=1e-9)
+
+
+def test_the_inverse_vane_equation_gives_the_direction_back() -> None:
+    vane = mast(vane={"inertia_factor": 1.4}).instruments[1]
+    assert isinstance(vane, Vane)
+    p = vane_parameters(vane)
+    x, y = -6.0 * np.cos(0.8), -6.0 * np.sin(0.8)
+    acceleration = vane_acceleration(p, 1.1, 0.5, x, y, 0.2, 0.0, 0.0, 0.0, 1.02)
+    found = wind_heading_from_motion(p, 1.1, 0.5, acceleration, 6.0, 0.2, 1.02)
+    assert found == pytest.approx(0.8, abs=1e-9)
+
+
+def test_the_local_parabola_is_exact_for_a_parabola() -> None:
+    time = np.sort(np.random.default_rng(1).integers(0, 2_000_000_000, 80))
+    x = (time - 900_000_000) * 1e-9
+    value, rate, second, *_ = local_parabola(
+        time, 3.0 - 2.0 * x + 5.0 * x * x, 900_000_000, 0.13
+    )
+    assert (value, rate, second) == pytest.approx((3.0, -2.0, 10.0), rel=1e-5)
+
+
+def test_the_inverse_method_lies_between_naive_and_kalman() -> None:
+    recording = blown(mast(), speed=7.0, duration=90.0)
+    assert isinstance(recording.station.instruments[0], Cup)
+    rms = {}
+    for method, bandwidth in (("kalman", 1.0), ("inverse", 1.0), ("inverse", 3.0), ("naive", 1.0)):
+        found = process(
+            recording, EstimatorSettings(method=method, bandwidth=bandwidth, window=90.0)  # type: ignore[arg-type]
+        )
+        inner = (found.time > recording.start + 20e9) & (found.time < recording.stop - 5e9)
+        error = (found.velocity - truth_at(recording, found.time))[inner, :2]
+        rms[method, bandwidth] = float(np.sqrt(np.mean(error**2)))
+    assert rms["kalman", 1.0] < 1.05 * rms["inverse", 3.0]
+    assert rms["kalman", 1.0] < 0.7 * rms["inverse", 1.0]
+    assert rms["inverse", 3.0] < 0.5 * rms["naive", 1.0]
