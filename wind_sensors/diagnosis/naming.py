@@ -25,7 +25,7 @@ ACCEPTED_GAIN = 14.0
 ACCEPTED_FURTHER_GAIN = 22.0
 """The same for a second and a third effect."""
 
-SMALLEST_SIZE = 1.0
+SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
 
 MOST_EFFECTS = 3
@@ -249,7 +249,9 @@ def name(
                 else f
                 for k, f in enumerate(sorted(refitted, key=_total))
             ]
-            refitted.sort(key=_total)
+            refitted = sorted(
+                (f for f in refitted if f is leader or _plausible(f)), key=_total
+            ) or [leader]
             if refitted[0].terms[-1].key == leader.terms[-1].key:
                 break
         before = fit(whitener, searcher.station, fixed, searcher.bank.without) if fixed else (

@@ -90,7 +90,7 @@ class Effect:
     templates: tuple[dict[str, float], ...]
     confusable: Mapping[str, str] = field(default_factory=dict)
     everywhere: bool = False
-    standing: float = 0.15
+    standing: float = 0.1
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None
 

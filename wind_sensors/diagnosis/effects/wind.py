@@ -38,7 +38,7 @@ WAKE_SHADOW = Effect(
     equation="U' = U (1 - depth exp(-(D - D0)^2 / (2 width^2)))",
     source="Gaussian wake profile; IEC 61400-12-1, annex on mast influence",
     region="a sector of wind directions, all speeds",
-    standing=0.08,
+    standing=0.06,
     parameters=(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),
         Parameter("depth", "1", -0.6, 0.95, minimum=0.05),
@@ -87,7 +87,7 @@ FLOW_DISTORTION = Effect(
     "turned by -d (c1 sin T - s1 cos T + c2 sin 2T - s2 cos 2T)",
     source="Fourier series of the potential flow around a cylinder",
     region="all directions, smoothly",
-    standing=0.08,
+    standing=0.06,
     parameters=(
         *(Parameter(name, "1", -0.3, 0.3, minimum=0.02) for name in _HARMONICS),
         Parameter("deflection", "1", -2.0, 2.0, healthy=None, step=0.2, starts=(0.0,)),

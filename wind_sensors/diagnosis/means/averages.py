@@ -82,7 +82,7 @@ def _series_at(time: TimeArray, series: Series | None) -> FloatArray:
     if series is None or series.time.size == 0:
         return np.full(time.size, np.nan)
     since = (series.time - time[0]) * 1e-9
-    return np.interp((time - time[0]) * 1e-9, since, series.value)
+    return np.asarray(np.interp((time - time[0]) * 1e-9, since, series.value))
 
 
 def averages_of(recording: Recording, deviations: Mapping[str, Series] | None = None) -> Averages:
@@ -115,7 +115,7 @@ def averages_of(recording: Recording, deviations: Mapping[str, Series] | None = 
     return Averages(
         station=station,
         time=time,
-        elapsed=(time - recording.start) * 1e-9,
+        elapsed=np.asarray((time - recording.start) * 1e-9, dtype=np.float64),
         interval=interval,
         speed={name: _at(time, known, value) for name, (known, value) in found.items()},
         heading={

@@ -15,7 +15,7 @@ from wind_sensors.instruments.filtered_turbulence import longitudinal_loss
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.changes import segments
-from wind_sensors.station.model import Cup, Propeller, Rotor, Station, Vane
+from wind_sensors.station.model import Cup, Propeller, Station, Vane
 from wind_sensors.station.parameters import rotor_parameters
 
 FloatArray = npt.NDArray[np.float64]
@@ -117,7 +117,9 @@ def mean_speed(
     return out
 
 
-def mean_heading(station: Station, vane: str, heading: FloatArray, elapsed: FloatArray) -> FloatArray:
+def mean_heading(
+    station: Station, vane: str, heading: FloatArray, elapsed: FloatArray
+) -> FloatArray:
     """Indicated mean heading of a vane's nose [rad]; arguments as in `mean_speed`."""
     out = np.full(heading.shape, np.nan)
     for segment in segments(station):
@@ -130,8 +132,3 @@ def mean_heading(station: Station, vane: str, heading: FloatArray, elapsed: Floa
         )
         out[rows] = true + swing + np.radians(instrument.offset_deg)
     return out
-
-
-def is_rotor(instrument: object) -> bool:
-    """Whether means of it are speeds."""
-    return isinstance(instrument, Rotor)

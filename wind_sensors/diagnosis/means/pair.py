@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -158,7 +159,7 @@ class Pair:
         left = measured - simulated
         if self.standing is not None:
             left = left - self.standing.at(speed, self.heading)
-        return left
+        return np.asarray(left)
 
     def rows(self, keep: BoolArray) -> Pair:
         """Some of the rows."""
@@ -201,7 +202,7 @@ def noise_of(residual: FloatArray, speed: FloatArray) -> FloatArray:
     """Robust standard deviation of a residual as a function of the wind [m/s]."""
     edges = np.quantile(speed, np.linspace(0.0, 1.0, 9))
     middles, widths = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         inside = (speed >= low) & (speed <= high)
         if np.count_nonzero(inside) > 20:
             chosen = residual[inside]

@@ -46,6 +46,8 @@ def rotor_effects() -> dict[str, Effect]:
         parameters = tuple(p for p in effect.parameters if p.name not in hidden)
         if name == "wake_shadow":
             parameters = tuple(_narrow(p) for p in parameters)
+        if name == "angular_response":
+            parameters = tuple(_physical(p) for p in parameters)
         found[name] = replace(
             effect,
             parameters=parameters,
@@ -53,6 +55,11 @@ def rotor_effects() -> dict[str, Effect]:
             everywhere=False,
         )
     return found
+
+
+def _physical(parameter: Parameter) -> Parameter:
+    """Between a little worse than the cosine and indifferent to the wind's slope; K14, sec. 6."""
+    return replace(parameter, low=-0.8, high=1.2) if parameter.name == "change" else parameter
 
 
 def _narrow(parameter: Parameter) -> Parameter:

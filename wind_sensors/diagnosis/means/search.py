@@ -50,7 +50,8 @@ class Bench:
     Attributes:
         station: The station as commissioned.
         residual: Residual of a station [m/s or rad] on some of the rows.
-        change: From a station, how another station's residual differs in the wind that the first shows.
+        change: From a station, how another station's residual differs in the wind that the
+            first shows.
         noise: Its standard deviation, shape (n,).
         block: Number of the block of each row.
         elapsed: Time of each row [s].
@@ -123,7 +124,7 @@ def _windows(bench: Bench) -> list[Interval]:
 
 
 def _sums(values: FloatArray, block: npt.NDArray[np.intp], count: int) -> FloatArray:
-    return np.bincount(block, values, count)
+    return np.asarray(np.bincount(block, values, count), dtype=np.float64)
 
 
 def screen(
@@ -353,7 +354,7 @@ class Explained:
     """What a search found.
 
     Attributes:
-        terms: Fitted together, in the order in which they were accepted.
+        terms: Fitted together: the given ones, then in the order in which they were accepted.
         named: How each was accepted.
         cost: Held-out cost of each block after each acceptance; the first without any term.
         p: Of what is left.
@@ -367,7 +368,7 @@ class Explained:
 
 def _t(gain: FloatArray) -> float:
     error = float(np.std(gain, ddof=1)) / np.sqrt(gain.size)
-    return float(gain.mean()) / max(error, 1e-12)
+    return float(gain.mean() / max(error, 1e-12))
 
 
 def search(
@@ -376,21 +377,24 @@ def search(
     instruments: Sequence[str],
     progress: Callable[[float], None] | None = None,
     most: int = MOST_TERMS,
-    constant: bool = True,
+    given: Sequence[Term] = (),
 ) -> Explained:
     """Add effects while they explain held-out blocks.
+
+    With `given` terms, which are fitted along but not named, only beginnings and endings are
+    looked for.
 
     A term is accepted when the family-wide p value of its screening and the t value of its gain
     over held-out blocks say so, whatever its size.
     """
-    fits: list[tuple[Term, ...]] = [(), ()]
-    terms: tuple[Term, ...] = ()
-    costs = [held_out(bench, fits, ())[0]]
+    terms = fit(bench, (), given, bench.everything) if given else ()
+    cost, fits = held_out(bench, [(), ()], terms)
+    costs = [cost]
     named: list[Named] = []
     p = 1.0
     needed = float(stats.t.ppf(1.0 - 0.005, bench.blocks - 1))
     while len(named) < most:
-        screened = screen(bench, effects, instruments, terms, constant)
+        screened = screen(bench, effects, instruments, terms, not given)
         p = screened.p
         if p > FAMILY_P:
             break

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from wind_sensors.diagnosis.means.averages import Averages, BoolArray
 
@@ -21,6 +22,7 @@ COLD = 1.5
 """Ice is looked for below this temperature [deg C], and its placebo above `WARM`."""
 WARM = 5.0
 
+FAMILY_P = 0.05
 SLOWED = 0.12
 SHORTEST_EPISODE = 3
 
@@ -54,9 +56,10 @@ class Ice:
         rows: Rows of all episodes together.
         cold_rows: Rows of blowing wind below `COLD`.
         warm_rows: Rows of blowing wind above `WARM`, with `warm_slow` of them as slow.
-        ratio: Median speed relative to what the partner leads to expect.
         warm_slow: See `warm_rows`.
-        warm_episodes: Episodes above `WARM`, of which there should be none.
+        ratio: Median speed relative to what the partner leads to expect.
+        ratios: Between these lie 95 % of the rows.
+        p: Probability that so many of all episodes fall into the cold by chance.
     """
 
     rotor: str
@@ -67,7 +70,8 @@ class Ice:
     warm_rows: int
     warm_slow: int
     ratio: float
-    warm_episodes: int
+    ratios: tuple[float, float]
+    p: float
 
 
 def runs(flag: BoolArray, shortest: int) -> list[tuple[int, int]]:
@@ -151,15 +155,18 @@ def ice(averages: Averages, rotor: str, partner: str, expected: FloatArray) -> I
     warm_episodes = len(runs(slow & warm, SHORTEST_EPISODE))
     rows = sum(last - first + 1 for first, last in episodes)
     cold_rows, warm_rows = int(np.sum(windy & cold)), int(np.sum(windy & warm))
-    if len(episodes) < 2 or cold_rows == 0 or warm_rows == 0:
+    if not episodes or cold_rows == 0 or warm_rows == 0:
+        return None
+    share = cold_rows / (cold_rows + warm_rows)
+    p = float(stats.binom.sf(len(episodes) - 1, len(episodes) + warm_episodes, share))
+    if p > FAMILY_P / len(averages.speed):
         return None
     warm_slow = sum(b - a + 1 for a, b in runs(slow & warm, SHORTEST_EPISODE))
-    if rows / cold_rows < 10.0 * max(warm_slow, 1) / warm_rows:
-        return None
     inside = np.concatenate([ratio[a : b + 1] for a, b in episodes])
+    low, middle, high = np.nanquantile(inside, (0.025, 0.5, 0.975))
     return Ice(
-        rotor, partner, tuple(episodes), rows, cold_rows, warm_rows, warm_slow,
-        float(np.nanmedian(inside)), warm_episodes,
+        rotor, partner, tuple(episodes), rows, cold_rows, warm_rows, warm_slow, float(middle),
+        (float(low), float(high)), p,
     )  # fmt: skip
 
 
