@@ -10,6 +10,7 @@ from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from wind_sensors.cli.baseline import learnt, read_baseline, workers
+from wind_sensors.cli.other_references import diagnose_otherwise, other_reference
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
@@ -46,6 +47,8 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
     with Progress(console=Console(stderr=True), transient=True) as progress:
         recording = read_recording(options.recording, options.station)
+        if other_reference(recording):
+            return diagnose_otherwise(options, recording, progress)
         if options.baseline is not None:
             baseline = read_baseline(options.baseline)
         else:

@@ -11,7 +11,7 @@ from wind_sensors.diagnosis.fitting import ALWAYS
 from wind_sensors.diagnosis.verdict import Diagnosis, Estimate, Finding
 from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
 
-_STYLE = """
+STYLE = """
 :root{--ink:#22303c;--muted:#5d6b77;--line:#e3e8ec;--blue:#1f6fb2;--orange:#b96a1c;--green:#3d7f52}
 *{box-sizing:border-box}
 body{margin:0;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:#f6f8f9}
@@ -33,7 +33,7 @@ td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .bar i{display:block;height:100%;background:var(--blue)}
 """
 
-_VERDICTS = {
+VERDICTS = {
     "none": "Nothing is wrong that this recording could show",
     "named": "The missing physics has a name",
     "ambiguous": "The missing physics is one of these",
@@ -42,45 +42,48 @@ _VERDICTS = {
 }
 
 
-def _words(effect: str) -> str:
+def words(effect: str) -> str:
+    """An identifier for people."""
     return effect.replace("_", " ")
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
+    """Three digits."""
     return f"{value:.3g}" if np.isfinite(value) else "?"
 
 
-def _estimate(name: str, e: Estimate) -> str:
+def estimate_text(name: str, e: Estimate) -> str:
+    """A parameter with its unit and interval."""
     unit = "" if e.unit == "1" else f" {e.unit}"
     interval = ""
     if np.isfinite(e.low):
-        interval = f" ({_number(e.low)} to {_number(e.high)})"
-    return f"{_words(name)} {_number(e.value)}{unit}{interval}"
+        interval = f" ({number_text(e.low)} to {number_text(e.high)})"
+    return f"{words(name)} {number_text(e.value)}{unit}{interval}"
 
 
 def _headline(diagnosis: Diagnosis) -> str:
     if diagnosis.findings and diagnosis.verdict == "named":
         names = " and ".join(
-            f"{_words(f.term.effect.name)} ({f.term.instrument})" for f in diagnosis.findings
+            f"{words(f.term.effect.name)} ({f.term.instrument})" for f in diagnosis.findings
         )
         return names[0].upper() + names[1:]
     if diagnosis.findings:
-        names = " or ".join(_words(f.term.effect.name) for f in diagnosis.findings)
+        names = " or ".join(words(f.term.effect.name) for f in diagnosis.findings)
         return names[0].upper() + names[1:]
-    return _VERDICTS[diagnosis.verdict]
+    return VERDICTS[diagnosis.verdict]
 
 
 def _summary(diagnosis: Diagnosis) -> str:
-    lines = [f"<p class='muted'>{escape(_VERDICTS[diagnosis.verdict])}.</p>"]
+    lines = [f"<p class='muted'>{escape(VERDICTS[diagnosis.verdict])}.</p>"]
     for finding in diagnosis.findings:
         term = finding.term
-        text = "; ".join(_estimate(k, e) for k, e in finding.parameters.items())
+        text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
         when = "all the time"
         if term.interval != ALWAYS:
             begin, end = term.interval
             when = f"from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
         lines.append(
-            f"<p><b>{escape(_words(term.effect.name))}</b>, {escape(term.instrument)}: "
+            f"<p><b>{escape(words(term.effect.name))}</b>, {escape(term.instrument)}: "
             f"{escape(term.effect.meaning)}<br>{escape(text)}; {when}.</p>"
         )
     if diagnosis.verdict == "unknown":
@@ -96,19 +99,21 @@ def _summary(diagnosis: Diagnosis) -> str:
 def _physics(finding: Finding) -> str:
     effect = finding.term.effect
     rows = "".join(
-        f"<tr><td>{escape(_words(key))}</td><td class='n'>{_number(e.value)}</td>"
-        f"<td class='n'>{_number(e.low)} to {_number(e.high)}</td><td>{escape(e.unit)}</td></tr>"
+        f"<tr><td>{escape(words(key))}</td><td class='n'>{number_text(e.value)}</td>"
+        f"<td class='n'>{number_text(e.low)} to {number_text(e.high)}</td>"
+        f"<td>{escape(e.unit)}</td></tr>"
         for key, e in finding.parameters.items()
     )
     region = finding.located.region
     return (
-        f"<section><h2>The physics: {escape(_words(effect.name))}</h2>"
+        f"<section><h2>The physics: {escape(words(effect.name))}</h2>"
         f"<span class='eq'>{escape(effect.equation)}</span>"
         f"<p class='muted'>{escape(effect.source)}. It shows in: {escape(effect.region)}.</p>"
         f"<div class='scroll'><table><tr><th>parameter</th><th>value</th><th>95 % interval</th>"
         f"<th>unit</th></tr>{rows}</table></div>"
         f"<p>The mismatch is largest in <b>{escape(region.label)}</b> ({escape(region.channel)}): "
-        f"{_number(finding.located.excess)} {escape(finding.located.unit)}; p = {finding.p:.3g} "
+        f"{number_text(finding.located.excess)} {escape(finding.located.unit)}; "
+        f"p = {finding.p:.3g} "
         f"after looking everywhere; {100.0 * finding.share:.0f} % of the whole misfit.</p>"
         "</section>"
     )
@@ -145,7 +150,7 @@ def _next(diagnosis: Diagnosis) -> str:
         for name, measurement in effect.confusable.items():
             mark = " (close here)" if name in others else ""
             lines.append(
-                f"<li>against {escape(_words(name))}{mark}: {escape(measurement)}</li>"
+                f"<li>against {escape(words(name))}{mark}: {escape(measurement)}</li>"
             )
     if diagnosis.verdict == "unknown":
         lines.append(
@@ -164,8 +169,8 @@ def _left(diagnosis: Diagnosis) -> str:
     unexplained = diagnosis.unexplained
     rows = "".join(
         f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
-        f"<td class='n'>{_number(f.excess)} {escape(f.unit)}</td>"
-        f"<td class='n'>{_number(f.score)}</td></tr>"
+        f"<td class='n'>{number_text(f.excess)} {escape(f.unit)}</td>"
+        f"<td class='n'>{number_text(f.score)}</td></tr>"
         for f in unexplained.regions[:4]
     )
     return (
@@ -179,7 +184,7 @@ def _left(diagnosis: Diagnosis) -> str:
 def _detectable(diagnosis: Diagnosis) -> str:
     known = catalogue()
     rows = "".join(
-        f"<tr><td>{escape(_words(name))}</td><td class='n'>{_number(value)} "
+        f"<tr><td>{escape(words(name))}</td><td class='n'>{number_text(value)} "
         f"{'' if unit == '1' else escape(unit)}</td>"
         f"<td>{escape(known[name].meaning if name in known else '')}</td></tr>"
         for name, (value, unit) in sorted(diagnosis.smallest_detectable.items())
@@ -227,6 +232,6 @@ def document(title: str, body: str) -> str:
     return (
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>"
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head>"
         f"<body><main>{body}</main></body></html>\n"
     )

@@ -1,0 +1,113 @@
+"""`wind diagnose` without a measured reference: means, and platforms with a latent wind."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+
+from rich.console import Console
+from rich.progress import Progress, TaskID
+from rich.table import Table
+
+from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means, learn_means
+from wind_sensors.diagnosis.outcome import Outcome
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.reading import read_recording, read_series
+from wind_sensors.report.outcome_files import write_outcome
+from wind_sensors.station.model import Rotor
+from wind_sensors.station.signals import Recording, Series
+
+DEVIATION = "_deviation"
+"""A rotor's topic with this behind it holds the standard deviations of its means."""
+
+
+def other_reference(recording: Recording) -> bool:
+    """Whether a recording has another reference than a measured wind."""
+    return is_of_means(recording)
+
+
+def deviations_of(path: str, recording: Recording) -> Mapping[str, Series]:
+    """Standard deviations of the rotors' speeds, where the bag has them."""
+    found = {}
+    for instrument in recording.station.instruments:
+        if isinstance(instrument, Rotor):
+            try:
+                found[instrument.name] = read_series(path, instrument.pulses.topic + DEVIATION)
+            except UserError:
+                continue
+    return found
+
+
+def diagnose_otherwise(
+    options: argparse.Namespace, recording: Recording, progress: Progress
+) -> int:
+    """Diagnose with what there is, write, and say so; 0 whatever the verdict.
+
+    Raises:
+        UserError: The recording does not suffice, or a baseline of another kind is given.
+    """
+    if options.baseline is not None:
+        raise UserError(
+            "a baseline file is for recordings with a measured reference.",
+            str(options.baseline),
+            "Give the healthy recordings with --healthy.",
+        )
+    outcome = _of_means(options, recording, _reporter(progress))
+    written = write_outcome(options.output, outcome)
+    progress.stop()
+    print_outcome(Console(), outcome)
+    for path in written:
+        print(f"wrote {path}")
+    return 0
+
+
+def _reporter(progress: Progress) -> Callable[[str, float], None]:
+    tasks: dict[str, TaskID] = {}
+
+    def report(phase: str, share: float) -> None:
+        if phase not in tasks:
+            tasks[phase] = progress.add_task(phase, total=1.0)
+        progress.update(tasks[phase], completed=share)
+
+    return report
+
+
+def _of_means(
+    options: argparse.Namespace, recording: Recording, report: Callable[[str, float], None]
+) -> Outcome:
+    healthy = []
+    for path in options.healthy:
+        one = read_recording(path, options.station)
+        healthy.append((one, deviations_of(path, one)))
+    deviations = deviations_of(options.recording, recording)
+    return diagnose_means(recording, deviations, learn_means(healthy), report)
+
+
+def print_outcome(console: Console, outcome: Outcome) -> None:
+    """Verdict and findings for people."""
+    console.print(f"[bold]{outcome.recording}[/bold]: {outcome.verdict}")
+    if outcome.findings:
+        table = Table(box=None)
+        for column in ("set", "effect", "instrument", "size", "95 %", "where", "removed"):
+            table.add_column(column)
+        for f in outcome.findings:
+            removed = "" if f.proof is None else f"{100.0 * f.proof.excess_removed:.0f} %"
+            for k, (key, e) in enumerate(f.parameters.items()):
+                unit = "" if e.unit == "1" else f" {e.unit}"
+                first = (
+                    str(f.set_number or ""), f.term.effect.name, f.term.instrument,
+                )  # fmt: skip
+                table.add_row(
+                    *(first if k == 0 else ("", "", "")),
+                    f"{key} {e.value:.3g}{unit}",
+                    f"{e.low:.3g} to {e.high:.3g}" if e.low == e.low else "",
+                    f.located.region.label if k == 0 else "",
+                    removed if k == 0 else "",
+                )
+        console.print(table)
+    if outcome.unexplained.description:
+        console.print(f"left over: {outcome.unexplained.description}")
+    for note in outcome.declined:
+        console.print(f"not claimed: {note}")
+    if not outcome.calibrated:
+        console.print("null not calibrated: give --healthy recordings of the same station")

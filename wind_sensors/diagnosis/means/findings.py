@@ -1,0 +1,361 @@
+"""From accepted terms to findings with their place, their intervals and their proof."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.means.averages import Averages
+from wind_sensors.diagnosis.means.pair import Pair, cells, table_of
+from wind_sensors.diagnosis.means.pair_effects import rotor_effects
+from wind_sensors.diagnosis.means.search import (
+    CLIP,
+    Bench,
+    Explained,
+    Named,
+    halves,
+    huber,
+    intervals,
+)
+from wind_sensors.diagnosis.means.silences import COLD, WARM, Ice, Silence
+from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
+from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.diagnosis.verdict import Estimate, Finding, Unexplained
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+DAY = 86400.0
+MOST_LIKELY_BY_CHANCE = 1e-4
+SMALLEST_REMAINDER = 0.02
+"""A remainder smaller than this share of the wind (rms over all means) is not worth a word."""
+
+WANDERING = 3.0
+"""A vane's change must exceed so many weekly deviations of what is normal."""
+_DRAWS = 400
+
+
+@dataclass(frozen=True)
+class PairWork:
+    """A pair with everything that was found about it.
+
+    `terms` are those of `explained`, on the rotors that the other heights point at.
+    """
+
+    pair: Pair
+    bench: Bench
+    explained: Explained
+    named: tuple[Named, ...]
+    terms: tuple[Term, ...]
+    limits: list[dict[str, tuple[float, float]]]
+
+    def floor(self) -> FloatArray:
+        """Held-out cost of each block that no function of direction and speed can remove."""
+        pair, bench = self.pair, self.bench
+        speed = pair.wind(bench.station)
+        residual = bench.residual(bench.station, bench.everything)
+        cost = np.zeros(bench.blocks)
+        sides = halves(bench)
+        for k in (0, 1):
+            own, other = sides[k], sides[1 - k]
+            table = table_of(residual[own] / speed[own], speed[own], pair.heading[own])
+            sector, level = cells(speed[other], pair.heading[other])
+            left = (residual[other] - table[sector, level] * speed[other]) / bench.noise[other]
+            cost += np.bincount(bench.block[other], huber(left), bench.blocks)
+        return cost
+
+    def smallest(self) -> dict[str, tuple[float, str]]:
+        """Sizes that this pair would have shown, at 3.3 standard errors over blocks."""
+        bench = self.bench
+        base = planted(bench.station, self.explained.terms)
+        change = bench.change(base)
+        psi = np.clip(bench.white(base, bench.everything), -CLIP, CLIP)
+        effects = rotor_effects()
+        found = {}
+        for name in ("calibration_drift", "calibration_offset"):
+            effect = effects[name]
+            parameter = effect.parameters[0]
+            term = Term(effect, self.pair.second, effect.templates[0])
+            g = -change(term.planted(base)) / bench.noise
+            scores = np.bincount(bench.block, psi * g, bench.blocks)
+            error = float(np.sqrt(np.sum(scores**2))) / max(float(g @ g), 1e-9)
+            moved = abs(effect.templates[0][parameter.name] - (parameter.healthy or 0.0))
+            found[f"{name}/{self.pair.name}"] = (3.3 * error * moved, parameter.unit)
+        return found
+
+
+def _share(gain: FloatArray, before: FloatArray, floor: FloatArray, picks: IntArray) -> float:
+    excess = float((before - floor)[picks].sum())
+    return float(gain[picks].sum()) / excess if excess > 0.0 else 0.0
+
+
+def _proof(
+    gain: FloatArray,
+    before: FloatArray,
+    floor: FloatArray,
+    rows: int,
+    runner_up: FloatArray | None,
+) -> Proof:
+    everything = np.arange(gain.size)
+    rng = np.random.default_rng(1)
+    drawn = [
+        _share(gain, before, floor, rng.integers(0, gain.size, gain.size)) for _ in range(_DRAWS)
+    ]
+    low, high = np.quantile(drawn, (0.025, 0.975))
+    return Proof(
+        before=float(np.sqrt(before.sum() / rows)),
+        after=float(np.sqrt(max(float((before - gain).sum()), 0.0) / rows)),
+        floor=float(np.sqrt(floor.sum() / rows)),
+        excess_removed=_share(gain, before, floor, everything),
+        low=float(low),
+        high=float(high),
+        placebo_removed=None
+        if runner_up is None
+        else _share(runner_up, before, floor, everything),
+    )
+
+
+def _estimates(term: Term, limits: dict[str, tuple[float, float]]) -> dict[str, Estimate]:
+    out = {}
+    for p in term.effect.parameters:
+        low, high = limits.get(p.name, (float("nan"), float("nan")))
+        out[p.name] = Estimate(term.values[p.name], low, high, p.unit)
+    return out
+
+
+def _from_north(heading_deg: float) -> float:
+    return (90.0 - heading_deg) % 360.0
+
+
+def _place(work: PairWork, term: Term, before: FloatArray) -> Found:
+    """Where a term of a pair acts, and how large the mismatch is there."""
+    pair = work.pair
+    channel = f"{term.instrument}/mean_speed"
+    speed = pair.wind(work.bench.station)
+    sign = 1.0 if term.instrument == pair.second else -1.0
+    if "bearing_from" in term.values:
+        from_north = _from_north(term.values["bearing_from"])
+        width = 2.0 * term.values["width"]
+        away = np.degrees(pair.heading) - term.values["bearing_from"]
+        inside = np.abs((away + 180.0) % 360.0 - 180.0) < width
+        low, high = (from_north - width) % 360.0, (from_north + width) % 360.0
+        region = Region(
+            channel, "direction", low, high, f"wind from {low:.0f} to {high:.0f} degrees"
+        )
+    elif term.interval != ALWAYS:
+        begin, end = term.interval
+        inside = work.pair.averages.elapsed >= begin
+        if end is not None:
+            inside &= work.pair.averages.elapsed < end
+        last = float(pair.averages.elapsed[-1]) if end is None else end
+        region = Region(
+            channel, "time", begin, last, f"from day {begin / DAY:.0f} to day {last / DAY:.0f}"
+        )
+    elif term.effect.name in {"bearing_friction", "calibration_offset"}:
+        inside = speed < 5.0
+        region = Region(channel, "speed", 2.0, 5.0, "wind from 2 to 5 m/s")
+    else:
+        inside = np.ones(speed.size, dtype=bool)
+        region = Region(channel, "all", 0.0, float(speed.max()), "all winds")
+    excess = sign * float(np.mean(before[inside])) if inside.any() else 0.0
+    return Found(region, float(np.sum(before[inside] ** 2)), excess, "m/s")
+
+
+def findings_of_pair(
+    work: PairWork, number: int
+) -> tuple[list[Finding], list[str], int, Unexplained]:
+    """Findings of a pair, what was declined, the last number of a set, and what is left.
+
+    Args:
+        work: The pair.
+        number: Of the last ambiguous set.
+    """
+    bench, explained = work.bench, work.explained
+    floor = np.minimum(work.floor(), explained.cost[-1])
+    rows = bench.noise.size
+    out: list[Finding] = []
+    notes: list[str] = []
+    for k, named in enumerate(work.named):
+        term, limits = work.terms[k], work.limits[k]
+        before = bench.residual(
+            planted(bench.station, [t for j, t in enumerate(explained.terms) if j != k]),
+            bench.everything,
+        )
+        if term.relative_size < 1.0:
+            notes.append(_small(work, term))
+            continue
+        equal = [
+            (t, b) for t, b in named.equal
+            if t.key != term.key and t.relative_size >= 1.0
+        ]  # fmt: skip
+        distinct = {t.key: (t, b) for t, b in reversed(equal)}
+        others = tuple((t.effect.name, t.instrument, b) for t, b in named.others[:6])
+        others = tuple((t.effect.name, t.instrument, b) for t, b in distinct.values()) + others
+        place = _place(work, term, before)
+        share = _share(named.gain, explained.cost[0], floor, np.arange(named.gain.size))
+        proof = _proof(named.gain, explained.cost[k], floor, rows, named.runner_up)
+        set_number = 0
+        if distinct:
+            number += 1
+            set_number = number
+        p = max(named.p, 0.001)
+        out.append(
+            Finding(
+                term, _estimates(term, limits), place, float(np.clip(share, 0.0, 1.0)), p,
+                others, proof, set_number,
+            )
+        )  # fmt: skip
+        for other, behind in distinct.values():
+            out.append(
+                Finding(
+                    other, _estimates(other, {}), _place(work, other, before), out[-1].share, p,
+                    ((term.effect.name, term.instrument, -behind),), None, set_number,
+                )
+            )  # fmt: skip
+    return out, notes, number, _left(work, floor)
+
+
+def _left(work: PairWork, floor: FloatArray) -> Unexplained:
+    """What follows direction and speed on held-out blocks and has no name."""
+    bench, explained = work.bench, work.explained
+    station = planted(bench.station, explained.terms)
+    speed = work.pair.wind(station)
+    relative = bench.residual(station, bench.everything) / speed
+    table = table_of(relative, speed, work.pair.heading)
+    sector, level = cells(speed, work.pair.heading)
+    size = float(np.sqrt(np.mean(table[sector, level] ** 2)))
+    gain = explained.cost[-1] - floor
+    p = float(stats.ttest_1samp(gain, 0.0, alternative="greater").pvalue) if gain.any() else 1.0
+    excess = float((explained.cost[0] - floor).sum())
+    share = float(gain.sum()) / excess if excess > 0.0 else 0.0
+    if size < SMALLEST_REMAINDER or p > 0.01:
+        return Unexplained(p, 0.0, (), "")
+    text = (
+        f"{work.pair.name}: {100.0 * size:.1f} % of the wind (rms) follows direction and speed "
+        "in a way that the named effects do not"
+    )
+    return Unexplained(p, share, (), text)
+
+
+def _small(work: PairWork, term: Term) -> str:
+    values = ", ".join(
+        f"{p.name.replace('_', ' ')} {term.values[p.name]:.3g} {p.unit}".removesuffix(" 1")
+        for p in term.effect.parameters
+    )
+    return (
+        f"{work.pair.name}: {term.effect.name.replace('_', ' ')} of {term.instrument} ({values}) "
+        "improves held-out blocks, but is smaller than what is worth reporting."
+    )
+
+
+def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
+    """A sensor that repeats one value."""
+    last = min(silence.last + 1, len(averages) - 1)
+    begin = float(averages.elapsed[silence.first])
+    end = float(averages.elapsed[last])
+    term = Term(catalogue()["stuck_sensor"], silence.sensor, {"start": begin, "stop": end})
+    is_rotor = silence.sensor in averages.speed
+    shown = f"{silence.value:.3g} m/s" if is_rotor else (
+        f"{_from_north(np.degrees(silence.value)):.1f} deg"
+    )
+    region = Region(
+        f"{silence.sensor}/{'mean_speed' if is_rotor else 'mean_direction'}", "time", begin, end,
+        f"{shown} from day {begin / DAY:.2f} to day {end / DAY:.2f}, "
+        f"{silence.rows} means of it in wind",
+    )  # fmt: skip
+    unit = "m/s" if is_rotor else "deg"
+    step = averages.interval
+    return Finding(
+        term,
+        {
+            "start": Estimate(begin, begin - step, begin, "s"),
+            "stop": Estimate(end, end - step, end, "s"),
+        },
+        Found(region, float(silence.rows), 0.0, unit),
+        1.0,
+        MOST_LIKELY_BY_CHANCE,
+        (),
+        None,
+    )
+
+
+def finding_of_ice(averages: Averages, ice: Ice) -> Finding:
+    """Episodes of a rotor that lags in the cold."""
+    first = float(averages.elapsed[ice.episodes[0][0]])
+    last = float(averages.elapsed[ice.episodes[-1][1]])
+    values = {"gain": max(ice.ratio, 0.2), "inertia_factor": 1.0}
+    term = Term(catalogue()["icing"], ice.rotor, values, (first, last))
+    hours = averages.interval / 3600.0
+    region = Region(
+        f"{ice.rotor}/mean_speed", "temperature", -40.0, COLD,
+        f"{len(ice.episodes)} episodes, {ice.rows * hours:.1f} h of {ice.cold_rows * hours:.0f} h "
+        f"of wind below {COLD:g} degC; {ice.warm_slow * hours:.1f} h of "
+        f"{ice.warm_rows * hours:.0f} h above {WARM:g} degC",
+    )  # fmt: skip
+    there = np.concatenate([averages.speed[ice.partner][a : b + 1] for a, b in ice.episodes])
+    missing = float(np.nanmean(there)) * (ice.ratio - 1.0)
+    return Finding(
+        term,
+        {"gain": Estimate(ice.ratio, *ice.ratios, "1")},
+        Found(region, float(ice.rows), missing, "m/s"),
+        1.0,
+        max(ice.p, MOST_LIKELY_BY_CHANCE),
+        (),
+        None,
+    )
+
+
+def findings_of_vane(
+    found: VaneBench, explained: Explained, standing: VaneStanding | None, vanes: int
+) -> tuple[list[Finding], list[str]]:
+    """Findings of a vane against the others, and what was declined."""
+    bench = found.bench
+    out: list[Finding] = []
+    notes: list[str] = []
+    middle = np.degrees(np.median(found.difference))
+    block = bench.block
+    weekly = np.array([np.median(found.difference[block == b]) for b in range(bench.blocks)])
+    spread = np.degrees(standing.spread if standing is not None else float(np.std(weekly)))
+    if standing is None:
+        notes.append(
+            f"{found.vane}: stands {middle:+.1f} deg from the other vanes (counter-clockwise "
+            f"positive; weekly deviation {spread:.1f} deg). The wind turns with height by as "
+            "much, so that this is no vane offset without a healthy recording or a sighting."
+        )
+    limits = intervals(bench, explained.terms)
+    given = len(explained.terms) - len(explained.named)
+    for k, named in enumerate(explained.named):
+        term = explained.terms[given + k]
+        size = abs(term.values.get("offset", term.relative_size))
+        if term.relative_size < 1.0 or size < WANDERING * spread:
+            notes.append(
+                f"{found.vane}: a change of {size:.1f} deg explains held-out blocks, but the "
+                f"wind's own turning with height varies by {spread:.1f} deg from week to week."
+            )
+            continue
+        begin, end = term.interval
+        last = float(bench.elapsed[-1]) if end is None else end
+        region = Region(
+            f"{found.vane}/mean_direction", "time", begin, last,
+            f"from day {begin / DAY:.0f} to day {last / DAY:.0f}",
+        )  # fmt: skip
+        out.append(
+            Finding(
+                term, _estimates(term, limits[given + k]),
+                Found(region, float(named.gain.sum()), float(middle), "deg"),
+                float(named.gain.sum() / explained.cost[0].sum()), max(named.p, 0.001),
+                tuple((t.effect.name, t.instrument, b) for t, b in named.others[:4]),
+                _proof(
+                    named.gain, explained.cost[k], explained.cost[-1], bench.noise.size,
+                    named.runner_up,
+                ),
+                0 if vanes > 2 else 1,
+            )
+        )  # fmt: skip
+    return out, notes

@@ -1,0 +1,108 @@
+"""What a diagnosis without a measured reference says: the same verdicts, on other evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.verdict import Finding, Unexplained, Verdict, finding_json
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A residual before and after, over something: one figure of the page.
+
+    Attributes:
+        title: What is compared.
+        axis: Label of the abscissa.
+        at: Abscissa, shape (n,).
+        before, after: Mean residual in each bin, shape (n,).
+        error: Standard error of them, shape (n,).
+        unit: Unit of the residuals.
+    """
+
+    title: str
+    axis: str
+    at: FloatArray
+    before: FloatArray
+    after: FloatArray
+    error: FloatArray
+    unit: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything that is said about a recording with a borrowed or latent reference.
+
+    Attributes:
+        recording: Its name.
+        verdict: In one word.
+        calibrated: Whether healthy recordings stand behind the null.
+        findings: Named effects; of an ambiguous set, all members.
+        unexplained: What is left.
+        smallest_detectable: By effect and instrument: value and unit.
+        station: The station with the named physics.
+        length: Of the recording [s].
+        reference: What took the place of a measured wind, for people.
+        declined: What was seen and not claimed, and why.
+        panels: Figures.
+        healthy: Names of the healthy recordings.
+    """
+
+    recording: str
+    verdict: Verdict
+    calibrated: bool
+    findings: tuple[Finding, ...]
+    unexplained: Unexplained
+    smallest_detectable: Mapping[str, tuple[float, str]]
+    station: Station
+    length: float
+    reference: str
+    declined: tuple[str, ...] = ()
+    panels: tuple[Panel, ...] = ()
+    healthy: tuple[str, ...] = ()
+
+
+def verdict_of(findings: tuple[Finding, ...], unexplained: Unexplained, limit: float) -> Verdict:
+    """The word for findings and a remainder.
+
+    Args:
+        findings: All of them.
+        unexplained: What is left.
+        limit: Share of the misfit above which a remainder counts.
+    """
+    if any(f.set_number == 0 for f in findings):
+        return "named"
+    if findings:
+        return "ambiguous"
+    if unexplained.p < 0.01 and unexplained.share > limit:
+        return "unknown"
+    return "none"
+
+
+def outcome_json(outcome: Outcome) -> dict[str, Any]:
+    """The content of `diagnosis.json`."""
+    return {
+        "recording": outcome.recording,
+        "verdict": outcome.verdict,
+        "null_calibrated": outcome.calibrated,
+        "reference": outcome.reference,
+        "findings": [finding_json(f, outcome.length) for f in outcome.findings],
+        "unexplained": {
+            "p": round(outcome.unexplained.p, 4),
+            "share": round(outcome.unexplained.share, 4),
+            "description": outcome.unexplained.description,
+        },
+        "declined": list(outcome.declined),
+        "smallest_detectable": {
+            key: {"value": float(f"{value:.4g}"), "unit": unit}
+            for key, (value, unit) in outcome.smallest_detectable.items()
+        },
+    }

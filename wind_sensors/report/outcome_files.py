@@ -1,0 +1,53 @@
+"""What a diagnosis without a measured reference leaves on disk."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from wind_sensors.diagnosis.outcome import Outcome, outcome_json
+from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.serialising import TopicMessages, serialised, template
+from wind_sensors.recordings.station_files import shipped_profiles
+from wind_sensors.recordings.writing import write_topics
+from wind_sensors.report.diagnosis_files import NAMES, NUMBER
+from wind_sensors.report.outcome_page import outcome_page
+from wind_sensors.station.writing import station_to_yaml
+
+
+def _residual_topics(outcome: Outcome) -> list[TopicMessages]:
+    """Binned residuals over time, before and after, of every panel that runs over days."""
+    types = typestore()
+    blank = template(types, NUMBER, [("data",)])
+    out = []
+    for panel in outcome.panels:
+        if panel.axis != "day" or not panel.at.size:
+            continue
+        time = np.rint(panel.at * 86400.0 * 1e9).astype(np.int64)
+        name = "".join(c if c.isalnum() else "_" for c in panel.title)
+        for when, values in (("before", panel.before), ("after", panel.after)):
+            raw = serialised(types, blank, {("data",): values})
+            out.append(TopicMessages(f"/{name}/residual_{when}", NUMBER, time, raw))
+    return out
+
+
+def write_outcome(folder: Path, outcome: Outcome) -> list[Path]:
+    """Write `diagnosis.json`, `report.html`, `station_corrected.yaml` and the residuals' bag.
+
+    Returns:
+        What was written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    station_text = station_to_yaml(outcome.station, shipped_profiles())
+    (folder / "diagnosis.json").write_text(
+        json.dumps(outcome_json(outcome), indent=1) + "\n", encoding="utf-8"
+    )
+    (folder / "report.html").write_text(outcome_page(outcome), encoding="utf-8")
+    (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
+    topics = _residual_topics(outcome)
+    if not topics:
+        return [folder / name for name in NAMES[:3]]
+    write_topics(folder / "residuals", station_text, topics)
+    return [folder / name for name in NAMES]

@@ -1,0 +1,117 @@
+"""The page of a diagnosis without a measured reference."""
+
+from __future__ import annotations
+
+from html import escape
+
+from matplotlib.figure import Figure
+
+from wind_sensors.diagnosis.outcome import Outcome, Panel
+from wind_sensors.diagnosis.verdict import Finding
+from wind_sensors.report import style
+from wind_sensors.report.diagnosis_figures import as_svg
+from wind_sensors.report.diagnosis_page import STYLE, VERDICTS, estimate_text, number_text, words
+
+
+def panel_figure(panels: list[Panel]) -> Figure:
+    """Residuals before and after: one panel below the other."""
+    with style.house():
+        figure = Figure(figsize=(8.0, 2.3 * len(panels)), layout="constrained")
+        axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+        for axis, panel in zip(axes, panels, strict=True):
+            axis.axhline(0.0, color="0.6", linewidth=0.8)
+            axis.errorbar(
+                panel.at, panel.before, 2.0 * panel.error, fmt=".-", color="#b96a1c",
+                linewidth=0.8, markersize=4, label="before",
+            )  # fmt: skip
+            axis.plot(panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after")
+            axis.set_xlabel(panel.axis)
+            axis.set_ylabel(panel.unit)
+            axis.set_title(panel.title, fontsize=10)
+        axes[0].legend(loc="best", fontsize=8)
+    return figure
+
+
+def _finding(finding: Finding) -> str:
+    effect = finding.term.effect
+    text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
+    together = (
+        f" <b>(one of set {finding.set_number}: the data do not say which)</b>"
+        if finding.set_number
+        else ""
+    )
+    proof = ""
+    if finding.proof is not None:
+        p = finding.proof
+        proof = (
+            f"<p>On blocks that were not fitted it removes <b>{100.0 * p.excess_removed:.0f} %</b> "
+            f"({100.0 * p.low:.0f} to {100.0 * p.high:.0f} %) of the misfit that was there; "
+            f"residual {p.before:.2f} before, {p.after:.2f} after, in units of its noise.</p>"
+        )
+    others = "".join(
+        f"<li>against {escape(words(name))}: {escape(measure)}</li>"
+        for name, measure in effect.confusable.items()
+        if name in {a for a, _, _ in finding.alternatives}
+    )
+    return (
+        f"<section><h2>{escape(words(effect.name))}: {escape(finding.term.instrument)}"
+        f"{together}</h2><p>{escape(effect.meaning)} {escape(text)}.</p>"
+        f"<span class='eq'>{escape(effect.equation)}</span>"
+        f"<p class='muted'>{escape(effect.source)}</p>"
+        f"<p>Where: {escape(finding.located.region.label)}; mismatch there "
+        f"{number_text(finding.located.excess)} {escape(finding.located.unit)}; "
+        f"p = {finding.p:.3g}.</p>{proof}"
+        + (f"<p>What would tell more:</p><ul>{others}</ul>" if others else "")
+        + "</section>"
+    )
+
+
+def _list(title: str, lines: tuple[str, ...]) -> str:
+    if not lines:
+        return ""
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    return f"<section><h2>{escape(title)}</h2><ul>{items}</ul></section>"
+
+
+def outcome_page(outcome: Outcome) -> str:
+    """The report as one HTML file without outside references."""
+    names = dict.fromkeys(
+        f"{words(f.term.effect.name)} ({f.term.instrument})"
+        for f in outcome.findings
+        if f.set_number == 0
+    )
+    headline = "; ".join(names) or VERDICTS[outcome.verdict]
+    titles = list(dict.fromkeys(p.title for p in outcome.panels))
+    figures = "".join(
+        as_svg(panel_figure([p for p in outcome.panels if p.title == title])) for title in titles
+    )
+    calibrated = (
+        f"Healthy recordings: {', '.join(outcome.healthy)}."
+        if outcome.calibrated
+        else "The null is not calibrated: no healthy recording was given."
+    )
+    left = outcome.unexplained.description or "Nothing that matters."
+    detectable = tuple(
+        f"{words(name)}: {number_text(value)}{'' if unit == '1' else ' ' + unit}"
+        for name, (value, unit) in sorted(outcome.smallest_detectable.items())
+    )
+    body = [
+        f"<header class='verdict {outcome.verdict}'><div class='muted'>"
+        f"{escape(outcome.recording)} · wind diagnose</div>"
+        f"<h1>{escape(headline[0].upper() + headline[1:])}</h1>"
+        f"<p class='muted'>{escape(VERDICTS[outcome.verdict])}. Reference: "
+        f"{escape(outcome.reference)}. {escape(calibrated)}</p></header>",
+        *(_finding(f) for f in outcome.findings),
+        f"<section><h2>Before and after</h2><p class='muted'>Orange: recorded minus simulated as "
+        f"described; bars are two standard errors. Blue: with the named physics.</p>{figures}"
+        "</section>" if figures else "",
+        _list("Seen, and not claimed", outcome.declined),
+        f"<section><h2>What is left</h2><p>{escape(left)}</p></section>",
+        _list("The smallest sizes that this recording would have shown", detectable),
+    ]
+    return (
+        "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width,initial-scale=1'>"
+        f"<title>Diagnosis of {escape(outcome.recording)}</title><style>{STYLE}</style></head>"
+        f"<body><main>{''.join(body)}</main></body></html>\n"
+    )
