@@ -16,16 +16,17 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.utilities import remove_ros_args
 
 from wind_sensors.errors import UserError
-from wind_sensors.estimation import METHODS, EstimatorSettings, make_estimator
+from wind_sensors.estimation import EstimatorSettings, make_estimator
 from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
+from wind_sensors.nodes.estimator_parameters import NODE_PARAMETERS
 from wind_sensors.nodes.inputs import EstimatorInputs
+from wind_sensors.nodes.mounting import MountingFromTf, SensorPose, tf2_is_installed
 from wind_sensors.nodes.outputs import TOPICS, WindPublishers
-from wind_sensors.nodes.parameters import Parameter, Value, changed, declare, describe
-from wind_sensors.nodes.quality import INPUT_DEPTH, input_quality, subscribe
+from wind_sensors.nodes.parameters import Parameter, Value, changed, declare, describe, number
+from wind_sensors.nodes.quality import input_quality, subscribe
 from wind_sensors.nodes.rehearsal import warm_up
 from wind_sensors.nodes.station_parameters import (
-    STATION,
     Role,
     base_document,
     effective_value,
@@ -37,190 +38,6 @@ from wind_sensors.nodes.station_parameters import (
 if TYPE_CHECKING:
     from wind_sensors.estimation.outputs import WindEstimate
     from wind_sensors.station.model import Station
-
-_DEFAULTS = EstimatorSettings()
-
-SETTINGS: tuple[Parameter, ...] = (
-    Parameter(
-        "method",
-        str,
-        _DEFAULTS.method,
-        "How wind follows from the signals: kalman (turbulence, instruments and pulse times in "
-        "one filter with a fixed-lag smoother), inverse (the instruments' equations solved for "
-        "the wind), naive (the calibration alone, for comparison).",
-        choices=tuple(METHODS),
-        changeable=True,
-    ),
-    Parameter(
-        "output_rate",
-        float,
-        _DEFAULTS.output_rate,
-        "Estimates per second [Hz].",
-        minimum=0.1,
-        maximum=200.0,
-        changeable=True,
-    ),
-    Parameter(
-        "smoother_lag",
-        float,
-        _DEFAULTS.smoother_lag,
-        "How much later data may still improve an estimate [s]; the estimate is late by this.",
-        minimum=0.05,
-        maximum=600.0,
-        changeable=True,
-    ),
-    Parameter(
-        "reordering_window",
-        float,
-        _DEFAULTS.reordering_window,
-        "How long to wait for messages that arrive out of order [s].",
-        minimum=0.0,
-        maximum=10.0,
-        changeable=True,
-    ),
-    Parameter(
-        "bandwidth",
-        float,
-        _DEFAULTS.bandwidth,
-        "Cut-off frequency of the noise filter of method inverse [Hz].",
-        minimum=0.01,
-        maximum=50.0,
-        changeable=True,
-    ),
-    Parameter(
-        "window",
-        float,
-        _DEFAULTS.window,
-        "Averaging time of the mean wind and its biases [s].",
-        minimum=1.0,
-        maximum=86400.0,
-        changeable=True,
-    ),
-    Parameter(
-        "adaptation_time",
-        float,
-        _DEFAULTS.adaptation_time,
-        "Memory of the turbulence that the filter assumes [s].",
-        minimum=5.0,
-        maximum=3600.0,
-        changeable=True,
-    ),
-    Parameter(
-        "stop_time",
-        float,
-        _DEFAULTS.stop_time,
-        "A rotor without an edge for this long has stopped [s].",
-        minimum=0.5,
-        maximum=600.0,
-        changeable=True,
-    ),
-    Parameter(
-        "gap_time",
-        float,
-        _DEFAULTS.gap_time,
-        "An input silent for this long has a gap [s].",
-        minimum=0.1,
-        maximum=600.0,
-        changeable=True,
-    ),
-    Parameter(
-        "jump_time",
-        float,
-        _DEFAULTS.jump_time,
-        "A clock that steps back by more than this restarts the estimator [s].",
-        minimum=0.5,
-        maximum=600.0,
-        changeable=True,
-    ),
-    Parameter(
-        "turbulence_intensity",
-        float,
-        _DEFAULTS.turbulence_intensity,
-        "Standard deviation over mean speed, assumed until the data have spoken.",
-        minimum=0.01,
-        maximum=1.0,
-        changeable=True,
-    ),
-    Parameter(
-        "use_air",
-        bool,
-        _DEFAULTS.use_air,
-        "Use temperature and pressure for the air density where they are measured.",
-        changeable=True,
-    ),
-)
-"""Parameters that make up `EstimatorSettings`."""
-
-NODE_PARAMETERS: tuple[Parameter, ...] = (
-    STATION,
-    *SETTINGS,
-    Parameter(
-        "frame_id",
-        str,
-        "map",
-        "Frame of the earth-fixed outputs; its axes point east, north, up.",
-        changeable=True,
-    ),
-    Parameter(
-        "sensor_frame_id",
-        str,
-        "wind_sensor",
-        "Frame of wind/apparent: x forward, y left, z up.",
-        changeable=True,
-    ),
-    Parameter(
-        "body_frame_id",
-        str,
-        "base_link",
-        "Frame of wind/body, the platform's: x forward, y left, z up.",
-        changeable=True,
-    ),
-    Parameter(
-        "nmea",
-        bool,
-        False,
-        "Publish NMEA 0183 MWV and MWD sentences on wind/nmea.",
-        changeable=True,
-    ),
-    Parameter("nmea_talker", str, "WI", "Talker of the sentences, two letters.", changeable=True),
-    Parameter(
-        "nmea_rate",
-        float,
-        1.0,
-        "Sentences per second [Hz].",
-        minimum=0.01,
-        maximum=20.0,
-        changeable=True,
-    ),
-    Parameter(
-        "reliable_inputs",
-        bool,
-        False,
-        "Ask for lost raw messages again; needs publishers that are reliable too.",
-    ),
-    Parameter(
-        "input_depth",
-        int,
-        INPUT_DEPTH,
-        "Raw messages kept for a busy node.",
-        minimum=1,
-        maximum=1_000_000,
-    ),
-    Parameter(
-        "silence",
-        float,
-        2.0,
-        "When nothing at all has arrived for this long of wall time [s], the node's own clock "
-        "moves the estimate on, this far behind it.",
-        minimum=0.1,
-        maximum=600.0,
-        changeable=True,
-    ),
-    Parameter(
-        "diagnostics_period", float, 1.0, "Between diagnostics [s].", minimum=0.05, maximum=60.0
-    ),
-)
-"""Parameters of every estimator node, besides those of its instruments."""
 
 _SECOND = 1_000_000_000
 _IDLE_CHECK = 0.25
@@ -287,13 +104,15 @@ class EstimatorNode(Node):
                 self._receiver(source.receive),
                 input_quality(
                     reliable=bool(self._values["reliable_inputs"]),
-                    depth=int(_number(self._values["input_depth"])),
+                    depth=int(number(self._values["input_depth"])),
                 ),
             )
+        wanted = bool(self._values["use_tf"]) and self.station.platform is not None
+        self._mounting = MountingFromTf(self) if wanted and tf2_is_installed() else None
         self._updater = Updater(
             self,
             [self._health, self._inputs.statuses],
-            period=_number(self._values["diagnostics_period"]),
+            period=number(self._values["diagnostics_period"]),
         )
         self._idle_timer = self.create_timer(
             _IDLE_CHECK, self._while_silent, clock=Clock(clock_type=ClockType.STEADY_TIME)
@@ -362,10 +181,35 @@ class EstimatorNode(Node):
             for window in self._estimator.take_windows():
                 self._outputs.publish_window(window)
 
+    def _ask_for_mounting(self) -> None:
+        """Use the sensor's pose as soon as tf2 tells it."""
+        platform = self.station.platform
+        if self._mounting is None or platform is None:
+            return
+        values = self._values
+        pose = self._mounting.ask(str(values["body_frame_id"]), str(values["sensor_frame_id"]))
+        stated = SensorPose(platform.sensor_position, platform.sensor_rotation_deg)
+        if pose is None or pose.is_close(stated):
+            return
+        self._document["platform"] |= {
+            "sensor_position": pose.position,
+            "sensor_rotation_deg": pose.rotation_deg,
+        }
+        self._replace_estimator(self._station(values), self._settings(values))
+
+    def _replace_estimator(self, station: Station, settings: EstimatorSettings) -> None:
+        """Start afresh: what was learnt belongs to the old constants."""
+        self._estimator = make_estimator(station, settings)
+        self._inputs.estimator = self._estimator
+        self._outputs.platform = station.platform
+        self.station = station
+        self._restarts += 1
+
     def _while_silent(self) -> None:
         """Only when every input is silent may the clock speak: stamps alone rule otherwise."""
+        self._ask_for_mounting()
         self._idle_checks += 1
-        silence = _number(self._values["silence"])
+        silence = number(self._values["silence"])
         # Checks are counted instead of seconds: after a long callback the messages that queued up
         # behind it must come first.
         if self._idle_checks * _IDLE_CHECK < silence:
@@ -384,6 +228,23 @@ class EstimatorNode(Node):
             f"Method {self._values['method']}.",
             {"restarts by parameter changes": str(self._restarts)},
         )
+        if self.station.platform is not None:
+            yield self._mounting_status()
+
+    def _mounting_status(self) -> Status:
+        platform = self.station.platform
+        assert platform is not None
+        if self._mounting is None:
+            source = "the station file"
+        elif self._mounting.pose is None:
+            source = "the station file, until tf2 knows the frames"
+        else:
+            source = "tf2"
+        values = {
+            "position": " ".join(f"{v:g}" for v in platform.sensor_position) + " m",
+            "roll, pitch, yaw": " ".join(f"{v:g}" for v in platform.sensor_rotation_deg) + " deg",
+        }
+        return Status("mounting", Level.OK, f"The sensor's pose comes from {source}.", values)
 
     def _apply_publishing(self) -> None:
         publishers, values = self._outputs, self._values
@@ -391,7 +252,7 @@ class EstimatorNode(Node):
         publishers.sensor_frame_id = str(values["sensor_frame_id"])
         publishers.body_frame_id = str(values["body_frame_id"])
         publishers.nmea_talker = str(values["nmea_talker"]) if values["nmea"] else ""
-        publishers.nmea_period = round(_SECOND / _number(values["nmea_rate"]))
+        publishers.nmea_period = round(_SECOND / number(values["nmea_rate"]))
 
     def _on_set_parameters(self, parameters: Sequence[RosParameter]) -> SetParametersResult:
         requested = {parameter.name: parameter.value for parameter in parameters}
@@ -399,11 +260,7 @@ class EstimatorNode(Node):
             values = changed(self._table, self._values, requested)
             station, settings = self._station(values), self._settings(values)
             if station != self.station or settings != self._settings(self._values):
-                # What was learnt belongs to the old constants, so the estimator starts afresh.
-                self._estimator = make_estimator(station, settings)
-                self._inputs.estimator = self._estimator
-                self.station = station
-                self._restarts += 1
+                self._replace_estimator(station, settings)
         except (ValueError, UserError) as problem:
             return SetParametersResult(successful=False, reason=str(problem))
         self._values = values
@@ -414,12 +271,6 @@ class EstimatorNode(Node):
         """Publish what the estimator still holds; call it when no more messages will come."""
         self._estimator.flush()
         self._publish()
-
-
-def _number(value: Value) -> float:
-    if not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} is not a number")
-    return float(value)
 
 
 def build(kind: NodeKind, arguments: Sequence[str]) -> list[Node]:

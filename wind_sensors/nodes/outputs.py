@@ -58,6 +58,7 @@ class WindPublishers:
         platform: The carrier; None on a mast.
 
     Attributes:
+        platform: The carrier with the sensor's pose; may be exchanged.
         frame_id: Of earth-fixed vectors.
         sensor_frame_id: Of the apparent wind.
         body_frame_id: Of the wind along the platform's axes.
@@ -72,7 +73,7 @@ class WindPublishers:
         self.nmea_talker = ""
         self.nmea_period = _SECOND
         self._node = node
-        self._platform = platform
+        self.platform = platform
         twist = TwistWithCovarianceStamped
         self._wind = self._advertise(twist, "wind")
         self._apparent = self._advertise(twist, "wind/apparent")
@@ -98,10 +99,10 @@ class WindPublishers:
             self._apparent.publish(
                 _twist(time, self.sensor_frame_id, estimate.apparent, estimate.apparent_covariance)
             )
-            if self._body is not None and self._platform is not None:
+            if self._body is not None and self.platform is not None:
                 along, spread = wind_in_platform(
                     estimate.velocity, estimate.covariance, estimate.to_earth,
-                    sensor_rotation(self._platform),
+                    sensor_rotation(self.platform),
                 )  # fmt: skip
                 self._body.publish(_twist(time, self.body_frame_id, along, spread))
             vector = Vector3Stamped()
@@ -134,9 +135,16 @@ class WindPublishers:
         if self._nmea is None:
             self._nmea = self._advertise(String, "wind/nmea")
         talker = self.nmea_talker
-        declination = None if self._platform is None else self._platform.magnetic_declination_deg
+        platform = self.platform
+        declination = None if platform is None else platform.magnetic_declination_deg
+        # Angles count from the bow, wherever the sensor's x axis points.
+        felt = (
+            estimate.apparent
+            if platform is None
+            else sensor_rotation(platform) @ estimate.apparent
+        )
         for text in (
-            apparent_wind_sentence(estimate.apparent, talker),
+            apparent_wind_sentence(felt, talker),
             true_wind_sentence(estimate.velocity, declination, talker),
         ):
             self._nmea.publish(String(data=text))

@@ -87,6 +87,17 @@ class Parameter:
         return float(value)
 
 
+def number(value: Value) -> float:
+    """A value that is known to be a number.
+
+    Raises:
+        TypeError: It is not.
+    """
+    if not isinstance(value, (int, float)):
+        raise TypeError(f"{value!r} is not a number")
+    return float(value)
+
+
 def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Value]:
     """Declare a table's parameters and return their values, overrides included.
 

@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.outputs import stamp
-from wind_sensors.nodes.parameters import Parameter, Value, declare, describe
+from wind_sensors.nodes.parameters import Parameter, declare, describe, number
 from wind_sensors.nodes.quality import SETTLING, advertise, output_quality
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.nodes.signal_messages import SignalEncoder
@@ -116,10 +116,10 @@ class SimulatorNode(Node):
         where = f"parameters of {self.get_fully_qualified_name()}"
         self.station: Station = station_with(document, instruments, where)
         self.finished = False
-        self._speed = _number(values["speed"])
-        self._waits_for = int(_number(values["wait_for_subscribers"]))
+        self._speed = number(values["speed"])
+        self._waits_for = int(number(values["wait_for_subscribers"]))
         self._with_clock = bool(values["publish_clock"])
-        self._duration = _number(values["duration"]) or math.inf
+        self._duration = number(values["duration"]) or math.inf
         self._scenario = scenario_of(values, self.station)
         self._begin = 0
         self._end: int | None = None
@@ -127,7 +127,7 @@ class SimulatorNode(Node):
             self.station, str(values["frame_id"]), with_truth=bool(values["publish_truth"])
         )
         self._encoder = encoder
-        depth = int(_number(values["output_depth"]))
+        depth = int(number(values["output_depth"]))
         self._outlets = {
             topic: advertise(self, message_type, topic, output_quality(depth))
             for topic, message_type in encoder.topics.items()
@@ -150,7 +150,7 @@ class SimulatorNode(Node):
         self._timer = self.create_timer(
             _TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
-        self._updater = Updater(self, [self._status], period=_number(values["diagnostics_period"]))
+        self._updater = Updater(self, [self._status], period=number(values["diagnostics_period"]))
 
     @property
     def elapsed(self) -> float:
@@ -242,12 +242,6 @@ class SimulatorNode(Node):
             yield Status("simulation", Level.OK, "The simulation has ended.", details)
         else:
             yield Status("simulation", Level.OK, "Signals are being published.", details)
-
-
-def _number(value: Value) -> float:
-    if not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} is not a number")
-    return float(value)
 
 
 def build(arguments: Sequence[str]) -> list[Node]:
