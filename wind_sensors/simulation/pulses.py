@@ -180,7 +180,7 @@ class PulseCircuit:
         """Of each stretch: the rotor, when slots passed [ns], their numbers, the end [ns]."""
         movement = response.rotors[self._name]
         drive = response.drive
-        out = []
+        out: list[tuple[Rotor, TimeArray, npt.NDArray[np.int64], int]] = []
         for stretch in response.stretches:
             rotor = stretch.segment.station.instrument(self._name)
             assert isinstance(rotor, Rotor)
