@@ -40,8 +40,19 @@ EQUAL_SHARE = 0.04
 """So are those that miss the winner by less than this share of its gain: the simulation is not
 exact enough to tell them apart."""
 
-REMAINDER_SCORE = 28.0
-REMAINDER_SHARE = 0.35
+LEAST_LIKENESS = 0.6
+"""Cosine between the white corrections of two explanations of the same thing."""
+
+REMAINDER_SCORES = {"frequency": 200.0, "spectrum": 45.0}
+"""Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
+raise the power of a band on healthy days, too."""
+
+REMAINDER_SCORE = 30.0
+"""The same for the other kinds."""
+
+REMAINDER_SHARE = 0.25
+"""Share of what there was to explain beyond which a structured remainder makes it unknown."""
+
 REMAINDER_P = 0.05
 
 INTERVAL_FACTOR = 1.96
@@ -167,18 +178,35 @@ def _equal(naming: Naming) -> list[Alternative]:
         term = alternative.fit.terms[-1]
         if term.key == own.key or any(a.fit.terms[-1].key == term.key for a in out):
             continue
-        if alternative.behind < limit:
+        if alternative.behind < limit and _alike(naming, alternative):
             out.append(alternative)
     return out
+
+
+def _alike(naming: Naming, alternative: Alternative) -> bool:
+    """Whether an alternative explains the same part of the data as the winner."""
+    own = naming.nothing - naming.fit.vector
+    other = naming.nothing - alternative.fit.vector
+    cosine = float(own @ other) / max(float(np.linalg.norm(own) * np.linalg.norm(other)), 1e-9)
+    return cosine > LEAST_LIKENESS
 
 
 def _remainder(
     naming: Naming, bank: RegionBank, calibration: float
 ) -> tuple[float, float, float]:
-    """Largest remaining score, its p value, its share of what there was to explain."""
-    left = float(bank.scores(naming.fit.vector).max()) / calibration
+    """Largest remaining score relative to its limit, its p value, its share of the misfit."""
+    scores = bank.scores(naming.fit.vector) / calibration
+    limits = np.array([REMAINDER_SCORES.get(r.kind, REMAINDER_SCORE) for r in bank.regions])
+    worst = int(np.argmax(scores / limits))
+    left = float(scores[worst])
     share = left / (left + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
-    return left, bank.p_value(left), share
+    return left / float(limits[worst]), bank.p_value(left), share
+
+
+def _patchwork(naming: Naming) -> bool:
+    """Whether passing effects were pieced together on one instrument: nothing known fits."""
+    passing = [t.instrument for t in naming.fit.terms if t.interval != ALWAYS]
+    return len(passing) != len(set(passing))
 
 
 def _description(found: Found) -> str:
@@ -232,7 +260,7 @@ def _verdict(
     detectable: Mapping[str, tuple[float, str, float]],
 ) -> Verdict:
     left, p, share = remainder
-    structured = left > REMAINDER_SCORE and p < REMAINDER_P
+    structured = left > 1.0 and p < REMAINDER_P
     if not naming.fit.terms:
         if structured:
             return "unknown"
@@ -240,7 +268,7 @@ def _verdict(
         if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
             return "inconclusive"
         return "none"
-    if structured and share > REMAINDER_SHARE:
+    if (structured and share > REMAINDER_SHARE) or _patchwork(naming):
         return "unknown"
     return "ambiguous" if equal else "named"
 
