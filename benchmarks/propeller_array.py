@@ -125,7 +125,7 @@ def bound(wind: FloatArray, axes: FloatArray, edges: list[int], scatter: float) 
     left = prior - crossed @ np.linalg.solve(information, np.conj(crossed.transpose(0, 2, 1)))
     errors = np.real(np.diagonal(left, axis1=1, axis2=2))
     total = errors[0] + 2.0 * errors[1:].sum(axis=0)
-    return np.sqrt(total / size)
+    return np.asarray(np.sqrt(total / size), dtype=np.float64)
 
 
 def compare(
