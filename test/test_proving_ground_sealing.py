@@ -181,6 +181,14 @@ def test_outcomes() -> None:
     assert judged((), "none", stratum="healthy").outcome == "none"
 
 
+def test_a_recording_that_is_refused_is_no_crash() -> None:
+    answer = {"stratum": "too_little", "kind": "A", "causes": []}
+    run = {"seconds": 1.0, "processor": 1.0, "memory": 1.0}
+    assert judge("x", answer, None, {**run, "status": 2}).outcome == "refused"
+    assert judge("x", answer, None, {**run, "status": 1}).outcome == "failed"
+    assert judge("x", answer, None, None).outcome == "failed"
+
+
 def test_rates_count_the_cases_they_speak_of() -> None:
     cases = [
         judged((), "none", stratum="healthy"),

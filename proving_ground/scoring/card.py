@@ -113,7 +113,7 @@ def is_failure(judged: Judged) -> bool:
     if judged.stratum == "unknown":
         return judged.verdict != "unknown"
     if judged.stratum == "too_little":
-        return judged.verdict not in ("inconclusive", "none") and not judged.found
+        return judged.verdict not in ("inconclusive", "refused", "none") and not judged.found
     if judged.outcome in ("none", "inconclusive") and judged.size < 1.0:
         return False
     return not judged.found

@@ -14,7 +14,7 @@ from proving_ground.scoring.outcome import Judged
 from proving_ground.scoring.rates import Rate, clopper_pearson
 
 KEPT, BROKEN, NEUTRAL = "#2a7f62", "#b5442d", "#4a6fa5"
-LAST_COLUMNS = ("several", "ambiguous", "unknown", "none", "inconclusive", "failed")
+LAST_COLUMNS = ("several", "ambiguous", "unknown", "none", "inconclusive", "refused", "failed")
 
 
 def rows_of(judged: Sequence[Judged]) -> list[str]:

@@ -16,8 +16,13 @@ OUTCOMES = (
     "unknown",
     "none",
     "inconclusive",
+    "refused",
     "failed",
 )
+SILENT = ("unknown", "none", "inconclusive", "refused", "failed")
+REFUSAL = 2
+"""Exit status of `wind diagnose` for a recording that it will not judge."""
+
 NAMES_SOMETHING = ("exact", "ambiguous with the truth", "partly", "wrong name", "wrong set")
 
 
@@ -55,7 +60,7 @@ class Judged:
     @property
     def reported(self) -> str:
         """What the diagnosis said, as a column of the confusion matrix."""
-        if self.verdict in ("none", "unknown", "inconclusive", "failed"):
+        if self.verdict in SILENT:
             return self.verdict
         if self.verdict == "ambiguous" or self.sets:
             return "ambiguous"
@@ -76,13 +81,13 @@ def judge(
     diagnosis: dict[str, Any] | None,
     run: dict[str, Any] | None,
 ) -> Judged:
-    """Compare a diagnosis with its answer; a missing one counts as failed."""
+    """Compare a diagnosis with its answer; a missing one counts as refused or as failed."""
     causes = answer["causes"]
     truth = tuple(str(c["effect"]) for c in causes)
     strangers = [str(c["stranger"]) for c in causes if "stranger" in c]
     sizes = [float(c["size_factor"]) for c in causes]
     named, sets = findings_of(diagnosis) if diagnosis else ((), ())
-    verdict = str(diagnosis["verdict"]) if diagnosis else "failed"
+    verdict = _verdict(diagnosis, run)
     outcome = outcome_of(truth, verdict, named, sets)
     return Judged(
         name=name,
@@ -130,7 +135,7 @@ def outcome_of(
     sets: tuple[tuple[str, ...], ...],
 ) -> str:
     """One of OUTCOMES."""
-    if verdict in ("none", "unknown", "inconclusive", "failed"):
+    if verdict in SILENT:
         return verdict
     real = set(truth) - {"unknown"}
     if any(effect not in real for effect in named):
@@ -143,6 +148,12 @@ def outcome_of(
     if not real <= offered or "unknown" in truth:
         return "partly"
     return "ambiguous with the truth" if sets else "exact"
+
+
+def _verdict(diagnosis: dict[str, Any] | None, run: dict[str, Any] | None) -> str:
+    if diagnosis:
+        return str(diagnosis["verdict"])
+    return "refused" if run and run.get("status") == REFUSAL else "failed"
 
 
 def _excess_removed(diagnosis: dict[str, Any]) -> float | None:

@@ -160,7 +160,7 @@ def promised_rates(judged: Sequence[Judged]) -> list[Rate]:
         rate(
             "under 30 s",
             judged,
-            lambda j: j.verdict != "failed",
+            lambda j: j.verdict not in ("failed", "refused"),
             lambda j: j.seconds < 30.0,
             "every one",
             at_least=1.0,
@@ -185,7 +185,7 @@ def promised_rates(judged: Sequence[Judged]) -> list[Rate]:
 
 def median_seconds(judged: Sequence[Judged]) -> tuple[float, float]:
     """Median run time [s], on the clock and of processors, of the diagnoses that ended."""
-    ended = [j for j in judged if j.verdict != "failed"]
+    ended = [j for j in judged if j.verdict not in ("failed", "refused")]
     if not ended:
         return float("nan"), float("nan")
     return median(j.seconds for j in ended), median(j.processor for j in ended)
