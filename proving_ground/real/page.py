@@ -22,6 +22,7 @@ from wind_sensors.errors import UserError
 
 STATION_SEED = 20_001
 ADDED_WIND = 4.0
+LONGEST = 900.0
 TURBULENCE_DOSES = (
     (),
     (Planted("rotor_inertia", 4.0),),
@@ -125,7 +126,10 @@ def _turbulence_rows(files: list[Path], output: Path) -> list[Row]:
 
 def _wind(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "wind_sensors.cli", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, -1, "", f"still at work after {LONGEST:.0f} s")
 
 
 def _import(files: list[Path], mapping: str, target: Path) -> str:
