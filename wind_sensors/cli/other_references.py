@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping
 
+import numpy as np
 from rich.console import Console
 from rich.progress import Progress, TaskID
-from rich.table import Table
 
+from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means, learn_means
 from wind_sensors.diagnosis.outcome import Outcome
 from wind_sensors.errors import UserError
@@ -23,7 +24,7 @@ DEVIATION = "_deviation"
 
 def other_reference(recording: Recording) -> bool:
     """Whether a recording has another reference than a measured wind."""
-    return is_of_means(recording)
+    return is_of_means(recording) or is_latent(recording)
 
 
 def deviations_of(path: str, recording: Recording) -> Mapping[str, Series]:
@@ -52,7 +53,11 @@ def diagnose_otherwise(
             str(options.baseline),
             "Give the healthy recordings with --healthy.",
         )
-    outcome = _of_means(options, recording, _reporter(progress))
+    report = _reporter(progress)
+    if is_of_means(recording):
+        outcome = _of_means(options, recording, report)
+    else:
+        outcome = diagnose_latent(recording, report)
     written = write_outcome(options.output, outcome)
     progress.stop()
     print_outcome(Console(), outcome)
@@ -86,25 +91,25 @@ def _of_means(
 def print_outcome(console: Console, outcome: Outcome) -> None:
     """Verdict and findings for people."""
     console.print(f"[bold]{outcome.recording}[/bold]: {outcome.verdict}")
-    if outcome.findings:
-        table = Table(box=None)
-        for column in ("set", "effect", "instrument", "size", "95 %", "where", "removed"):
-            table.add_column(column)
-        for f in outcome.findings:
-            removed = "" if f.proof is None else f"{100.0 * f.proof.excess_removed:.0f} %"
-            for k, (key, e) in enumerate(f.parameters.items()):
+    for f in outcome.findings:
+        together = f" (one of set {f.set_number})" if f.set_number else ""
+        console.print(
+            f"  [bold]{f.term.effect.name}[/bold] {f.term.instrument}{together}: "
+            f"{f.located.region.label}",
+            highlight=False,
+        )
+        if f.term.effect.name != "stuck_sensor":
+            for key, e in f.parameters.items():
+                interval = f" ({e.low:.3g} to {e.high:.3g})" if np.isfinite(e.low) else ""
                 unit = "" if e.unit == "1" else f" {e.unit}"
-                first = (
-                    str(f.set_number or ""), f.term.effect.name, f.term.instrument,
-                )  # fmt: skip
-                table.add_row(
-                    *(first if k == 0 else ("", "", "")),
-                    f"{key} {e.value:.3g}{unit}",
-                    f"{e.low:.3g} to {e.high:.3g}" if e.low == e.low else "",
-                    f.located.region.label if k == 0 else "",
-                    removed if k == 0 else "",
-                )
-        console.print(table)
+                console.print(f"    {key} {e.value:.3g}{unit}{interval}", highlight=False)
+        if f.proof is not None:
+            console.print(
+                f"    removes {100.0 * f.proof.excess_removed:.0f} % "
+                f"({100.0 * f.proof.low:.0f} to {100.0 * f.proof.high:.0f} %) of the misfit on "
+                "held-out blocks",
+                highlight=False,
+            )
     if outcome.unexplained.description:
         console.print(f"left over: {outcome.unexplained.description}")
     for note in outcome.declined:

@@ -192,7 +192,8 @@ def findings_of_pair(
             continue
         equal = [
             (t, b) for t, b in named.equal
-            if t.key != term.key and t.relative_size >= 1.0
+            if t.key != term.key
+            and (t.relative_size >= 1.0 or t.effect.name == term.effect.name)
         ]  # fmt: skip
         distinct = {t.key: (t, b) for t, b in reversed(equal)}
         others = tuple((t.effect.name, t.instrument, b) for t, b in named.others[:6])

@@ -63,9 +63,9 @@ def direction_of(averages: Averages) -> FloatArray:
         both = np.isfinite(out) & np.isfinite(other)
         gap = ~np.isfinite(out) & np.isfinite(other)
         if both.sum() > 100 and gap.any():
-            turn = np.angle(np.median(np.exp(1j * (out[both] - other[both]))))
+            turn = np.angle(np.mean(np.exp(1j * (out[both] - other[both]))))
             out[gap] = other[gap] + turn
-    return out
+    return np.asarray(out)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.effects.definition import Effect, entry_of
 from wind_sensors.diagnosis.fitting import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.means.averages import BoolArray
 from wind_sensors.diagnosis.means.pair import Pair
@@ -154,7 +154,7 @@ def screen(
     rows: list[tuple[FloatArray, FloatArray, Term]] = []
     for name, effect in effects.items():
         for instrument in instruments:
-            if not effect.applies(base.instrument(instrument), base):
+            if not effect.applies(entry_of(base, instrument), base):
                 continue
             for template in effect.templates:
                 term = Term(effect, instrument, template)
@@ -391,6 +391,7 @@ def search(
     cost, fits = held_out(bench, [(), ()], terms)
     costs = [cost]
     named: list[Named] = []
+    refused: set[tuple[str, str]] = set()
     p = 1.0
     needed = float(stats.t.ppf(1.0 - 0.005, bench.blocks - 1))
     while len(named) < most:
@@ -403,7 +404,7 @@ def search(
             taken = any(
                 t.key == candidate.term.key and t.effect.name != "wake_shadow" for t in terms
             )
-            if taken and candidate.term.interval == ALWAYS:
+            if candidate.term.key in refused or (taken and candidate.term.interval == ALWAYS):
                 continue
             cost, both = held_out(bench, fits, (candidate.term,))
             whole = fit(bench, terms, (candidate.term,), bench.everything, 4)[0]
@@ -424,7 +425,12 @@ def search(
             else:
                 others.append((other, 0.5 * float(behind.sum())))
                 runner = its_gain if runner is None else runner
-        terms = fit(bench, (), (*terms, best), bench.everything)
+        together = fit(bench, (), (*terms, best), bench.everything)
+        if not all(_inside(t) for t in together[len(given) :]):
+            # Two names for one thing push each other out of what is possible.
+            refused.add(best.key)
+            continue
+        terms = together
         cost, fits = held_out(bench, [(), ()], terms)
         named.append(
             Named(terms[-1], p, costs[-1] - cost, tuple(equal), tuple(others), runner)

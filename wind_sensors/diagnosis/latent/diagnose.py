@@ -1,0 +1,329 @@
+"""The diagnosis of a moving platform whose wind nobody else measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
+from wind_sensors.diagnosis.fitting import Term, planted
+from wind_sensors.diagnosis.latent.headings import (
+    BLOCK,
+    Felt,
+    bench_of,
+    felt_by,
+    heading_of,
+    heading_spread,
+    residual_of,
+)
+from wind_sensors.diagnosis.means.search import (
+    Bench,
+    Explained,
+    Named,
+    fit,
+    held_out,
+    intervals,
+    search,
+)
+from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
+from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.diagnosis.verdict import Estimate, Finding, Unexplained
+from wind_sensors.errors import UserError
+from wind_sensors.station.model import Station
+from wind_sensors.station.signals import Recording
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+EFFECTS = (
+    "platform_velocity", "platform_velocity_scale", "heading_deviation", "vane_offset",
+    "calibration_drift",
+)  # fmt: skip
+"""Effects that a wind which must be the same from all headings can show."""
+
+SEVERAL_HEADINGS = np.radians(20.0)
+"""Circular deviation of the heading [rad] from which a block shows several headings."""
+
+FEWEST_TURNING = 4
+"""So many blocks must show several headings."""
+
+NOT_SEPARABLE = {
+    ("calibration_drift", "platform_velocity_scale"): (
+        "Only the ratio of the anemometer's gain and the scale of the platform's speed is seen: "
+        "the wind, unknown itself, takes up the rest. A run in calm air separates them."
+    ),
+    ("vane_offset", "heading_deviation"): (
+        "A turned vane and a compass with a constant error look the same while the wind is "
+        "unknown. Sighting the vane's mark along the keel separates them."
+    ),
+}
+_DRAWS = 400
+
+
+def latent_effects(station: Station) -> dict[str, Effect]:
+    """The effects, with what the station file states as the healthy value of the motion."""
+    known = catalogue()
+    found = {name: replace(known[name], everywhere=False) for name in EFFECTS}
+    share = station.platform.velocity_share if station.platform is not None else 1.0
+    velocity = found["platform_velocity"]
+    parameter = replace(velocity.parameters[0], low=-0.5, high=2.0, healthy=share, starts=())
+    found["platform_velocity"] = replace(
+        velocity, parameters=(parameter,), templates=({"velocity_share": share + 0.1},)
+    )
+    return found
+
+
+def is_latent(recording: Recording) -> bool:
+    """Whether a recording has a moving platform and no reference."""
+    return recording.reference is None and recording.platform is not None
+
+
+def diagnose_latent(
+    recording: Recording, progress: Callable[[str, float], None] | None = None
+) -> Outcome:
+    """Find the physics that a station file leaves out on a moving platform without reference.
+
+    Args:
+        recording: With a rotor, a vane and a platform.
+        progress: Called with a phase and the share of it that is done.
+
+    Raises:
+        UserError: There is no rotor with a vane, or the record is too short.
+    """
+    felt = felt_by(recording)
+    station = recording.station
+    spread = heading_spread(felt)
+    turning = int(np.count_nonzero(spread > SEVERAL_HEADINGS))
+    if spread.size < 6:
+        raise UserError(
+            f"{spread.size} blocks of {BLOCK:.0f} s with wind and motion are too few.",
+            recording.name,
+            "Record for an hour or more.",
+        )
+    bench = bench_of(felt, station)
+    explained = search(
+        bench, latent_effects(station), (PLATFORM, felt.vane, felt.rotor),
+        lambda share: progress("headings", share) if progress else None, 3,
+    )  # fmt: skip
+    findings = _findings(felt, bench, explained)
+    declined = _declined(bench, station, explained)
+    verdict = verdict_of(findings, Unexplained(1.0, 0.0, (), ""), 1.0)
+    if verdict == "none" and turning < FEWEST_TURNING:
+        verdict = "inconclusive"
+    whole, notes = _with_whole_motion(bench, explained)
+    kept = [t for t, n in zip(whole, explained.named, strict=True) if not _twins(n)]
+    after = planted(station, explained.terms)
+    return Outcome(
+        recording=recording.name,
+        verdict=verdict,
+        calibrated=False,
+        findings=findings,
+        unexplained=Unexplained(explained.p, 0.0, (), ""),
+        smallest_detectable=_smallest(bench, after),
+        station=planted(station, kept),
+        length=(recording.stop - recording.start) * 1e-9,
+        reference=f"latent: the earth wind, constant with a trend within {BLOCK:.0f} s; "
+        f"{turning} of {spread.size} blocks show several headings",
+        declined=(*notes, *declined),
+        panels=_panels(felt, station, after),
+    )
+
+
+def _twins(named: Named) -> dict[tuple[str, str], tuple[Term, float]]:
+    """Other explanations of a finding that are large enough to matter, by effect."""
+    return {
+        t.key: (t, b)
+        for t, b in reversed(named.equal)
+        if t.key != named.term.key and t.relative_size >= 1.0
+    }
+
+
+def _with_whole_motion(bench: Bench, explained: Explained) -> tuple[list[Term], tuple[str, ...]]:
+    """The terms, the motion taken as a whole where held-out blocks do not contradict."""
+    out, notes = [], []
+    needed = float(stats.t.ppf(0.995, bench.blocks - 1))
+    for term in explained.terms:
+        if term.effect.name != "platform_velocity":
+            out.append(term)
+            continue
+        whole = replace(term, values={"velocity_share": 1.0})
+        rest = [t for t in explained.terms if t is not term]
+        cost, _ = held_out(bench, [(whole,), (whole,)], rest)
+        behind = cost - explained.cost[-1]
+        t = float(behind.mean() / max(np.std(behind, ddof=1) / np.sqrt(behind.size), 1e-9))
+        fitted = term.values["velocity_share"]
+        if t < needed:
+            out.append(whole)
+            notes.append(
+                f"a velocity share other than 1: the fit of {fitted:.2f} is not better than the "
+                f"whole motion on held-out blocks (t = {t:.1f}, {needed:.1f} needed); the "
+                "corrected station has 1."
+            )
+        else:
+            out.append(term)
+    return out, tuple(notes)
+
+
+def _share(gain: FloatArray, excess: FloatArray, picks: IntArray) -> float:
+    whole = float(excess[picks].sum())
+    return float(gain[picks].sum()) / whole if whole > 0.0 else 0.0
+
+
+def _placebo(felt: Felt, bench: Bench, term: Term) -> FloatArray | None:
+    """What the same effect gains with the platform's velocity of another time."""
+    if term.effect.name not in {"platform_velocity", "platform_velocity_scale"}:
+        return None
+    shift = len(felt) // 3
+    moved = replace(felt.motion, velocity=np.roll(felt.motion.velocity, shift, axis=0))
+    other = bench_of(replace(felt, motion=moved), bench.station)
+    other = replace(other, noise=bench.noise)
+    cost, _ = held_out(other, [(), ()], (term,))
+    nothing, _ = held_out(other, [(), ()], ())
+    return nothing - cost
+
+
+def _findings(felt: Felt, bench: Bench, explained: Explained) -> tuple[Finding, ...]:
+    limits = intervals(bench, explained.terms)
+    out: list[Finding] = []
+    for k, (named, term) in enumerate(zip(explained.named, explained.terms, strict=True)):
+        if term.relative_size < 1.0:
+            continue
+        before = explained.cost[k]
+        # What the best explanation leaves is the gusts' share: nobody can remove it.
+        excess = before - explained.cost[-1]
+        everything = np.arange(excess.size)
+        rng = np.random.default_rng(1)
+        drawn = [
+            _share(named.gain, before, rng.integers(0, excess.size, excess.size))
+            for _ in range(_DRAWS)
+        ]
+        low, high = np.quantile(drawn, (0.025, 0.975))
+        placebo = _placebo(felt, bench, term)
+        proof = Proof(
+            before=float(np.sqrt(before.mean() * before.size / bench.noise.size)),
+            after=float(np.sqrt(explained.cost[k + 1].sum() / bench.noise.size)),
+            floor=float(np.sqrt(explained.cost[-1].sum() / bench.noise.size)),
+            excess_removed=_share(named.gain, before, everything),
+            low=float(low),
+            high=float(high),
+            placebo_removed=None if placebo is None else _share(placebo, before, everything),
+        )
+        twins = _twins(named)
+        number = 1 + max((f.set_number for f in out), default=0) if twins else 0
+        found = residual_of(felt, bench.station, np.ones(len(felt), dtype=bool))
+        region = Region(
+            "apparent_wind", "heading", 0.0, 360.0, "between the headings within ten minutes"
+        )
+        size = float(np.sqrt(np.mean(np.abs(found) ** 2)))
+        place = Found(region, float(named.gain.sum()), size, "m/s")
+        parameters = {
+            p.name: Estimate(term.values[p.name], *limits[k][p.name], p.unit)
+            for p in term.effect.parameters
+        }
+        others = tuple((t.effect.name, t.instrument, b) for t, b in twins.values())
+        others += tuple((t.effect.name, t.instrument, b) for t, b in named.others[:4])
+        out.append(
+            Finding(
+                term, parameters, place, proof.excess_removed, max(named.p, 0.001), others,
+                proof, number,
+            )
+        )  # fmt: skip
+        for other, behind in twins.values():
+            values = {
+                p.name: Estimate(other.values[p.name], float("nan"), float("nan"), p.unit)
+                for p in other.effect.parameters
+            }
+            out.append(
+                Finding(
+                    other, values, place, proof.excess_removed, max(named.p, 0.001),
+                    ((term.effect.name, term.instrument, -behind),), None, number,
+                )
+            )  # fmt: skip
+    return tuple(out)
+
+
+def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str, ...]:
+    """What each other effect would say, and why it is not said."""
+    effects = latent_effects(station)
+    given = {t.effect.name for t in explained.terms}
+    lines = []
+    vanes = [i.name for i in station.instruments if effects["vane_offset"].applies(i, station)]
+    rotors = [
+        i.name for i in station.instruments if effects["calibration_drift"].applies(i, station)
+    ]
+    places = {"vane_offset": vanes[0], "calibration_drift": rotors[0]}
+    _, halves = held_out(bench, [(), ()], explained.terms)
+    base = explained.cost[-1]
+    for name, effect in effects.items():
+        if name in given or name in {"platform_velocity", "platform_velocity_scale"}:
+            continue
+        start = Term(effect, places.get(name, PLATFORM), effect.templates[0])
+        cost, _ = held_out(bench, halves, (start,))
+        best = fit(bench, explained.terms, (start,), bench.everything)[0]
+        limits = intervals(bench, (*explained.terms, best))[-1]
+        gain = base - cost
+        values = ", ".join(
+            f"{p.name.replace('_', ' ')} {best.values[p.name]:.2f} "
+            f"({limits[p.name][0]:.2f} to {limits[p.name][1]:.2f}) {p.unit}".removesuffix(" 1")
+            for p in effect.parameters
+        )
+        share = 100.0 * float(gain.sum()) / float(base.sum())
+        error = float(np.std(gain, ddof=1) / np.sqrt(gain.size))
+        t = float(gain.mean()) / max(error, 1e-9)
+        lines.append(
+            f"{name.replace('_', ' ')}: the best fit is {values}; on held-out blocks it changes "
+            f"the misfit by {-share:+.1f} % (t = {t:.1f}), which is no ground for a correction."
+        )
+    lines += [text for pair, text in NOT_SEPARABLE.items() if not given & set(pair)]
+    return tuple(lines)
+
+
+def _smallest(bench: Bench, station: Station) -> dict[str, tuple[float, str]]:
+    """Sizes that the record would have shown, at 3.3 standard errors over blocks."""
+    effects = latent_effects(station)
+    found = {}
+    for name in ("platform_velocity", "heading_deviation"):
+        effect = effects[name]
+        term = Term(effect, PLATFORM, effect.templates[0])
+        g = bench.residual(term.planted(station), bench.everything) - bench.residual(
+            station, bench.everything
+        )
+        psi = bench.white(station, bench.everything)
+        scores = np.bincount(bench.block, psi * g / bench.noise, bench.blocks)
+        error = float(np.sqrt(np.sum(scores**2)) / max(float(np.sum((g / bench.noise) ** 2)), 1e-9))
+        parameter = effect.parameters[0]
+        moved = abs(effect.templates[0][parameter.name] - (parameter.healthy or 0.0))
+        found[f"{name}/{PLATFORM}"] = (3.3 * error * moved, parameter.unit)
+    return found
+
+
+def _panels(felt: Felt, before: Station, after: Station) -> tuple[Panel, ...]:
+    """Scatter of the apparent wind about the best slowly changing wind."""
+    everything = np.ones(len(felt), dtype=bool)
+    one = np.abs(residual_of(felt, before, everything))
+    two = np.abs(residual_of(felt, after, everything))
+    count = np.bincount(felt.block)
+    when = np.asarray(np.bincount(felt.block, felt.elapsed) / count / 60.0, dtype=np.float64)
+    rms = [np.asarray(np.sqrt(np.bincount(felt.block, r**2) / count)) for r in (one, two)]
+    compass = np.mod(90.0 - np.degrees(heading_of(felt.motion)), 360.0)
+    sector = np.floor(compass / 30.0).astype(np.intp)
+    filled = np.bincount(sector, minlength=12) > 20
+    at = (np.arange(12) * 30.0 + 15.0)[filled]
+    size = np.maximum(np.bincount(sector, minlength=12), 1)
+    by = [np.sqrt(np.bincount(sector, r**2, 12) / size)[filled] for r in (one, two)]
+    return (
+        Panel(
+            "apparent wind against ten-minute winds", "minutes", when, rms[0], rms[1],
+            np.asarray(rms[0] / np.sqrt(count)), "rms, m/s",
+        ),
+        Panel(
+            "apparent wind against ten-minute winds", "heading [deg]", at, by[0], by[1],
+            by[0] / np.sqrt(size[filled]), "rms, m/s",
+        ),
+    )  # fmt: skip
