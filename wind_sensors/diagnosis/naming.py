@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.effects.definition import Parameter
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
 from wind_sensors.diagnosis.screening import group_templates, screen, screen_windows
 from wind_sensors.diagnosis.search import (
+    PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_INTERVAL,
     PENALTY_PER_PARAMETER,
     Searcher,
@@ -25,10 +27,16 @@ ACCEPTED_GAIN = 14.0
 ACCEPTED_FURTHER_GAIN = 22.0
 """The same for a second and a third effect."""
 
+FURTHER_SHARE = 0.05
+"""A further effect must also bring this share of the gain so far."""
+
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
 
 MOST_EFFECTS = 3
+
+NEAR_AN_END = 8.0
+"""A beginning or an end this close to the record's own [s] is none."""
 
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
@@ -39,19 +47,33 @@ FINALISTS = 5
 FAR_BEHIND = 0.6
 """Fits that miss more than this share of the leader's gain do not compete with it."""
 
+STALL_SPEED = 4.5
+"""Up to this wind speed [m/s] a sticking bearing may hold a rotor."""
+
 WORTH_ANOTHER_TURN = 14.0
 """Largest linear score below which no further effect is looked for."""
 
 
 def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
-    """What parameters and intervals cost."""
-    cost = PENALTY_PER_PARAMETER * parameters
+    """What parameters and intervals cost; a term's second parameter costs more than its first."""
+    firsts = min(len(terms), parameters)
+    cost = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
     for term in terms:
         if term.interval != ALWAYS:
             cost += PENALTY_PER_INTERVAL * sum(
                 (term.interval[0] > 0.0, term.interval[1] is not None)
             )
     return cost
+
+
+def _needed(current: Fit, nothing: float, first: bool) -> float:
+    """Gain that the next term has to bring.
+
+    After a large effect the simulation's own inexactness is worth a share of its gain.
+    """
+    if first:
+        return ACCEPTED_GAIN
+    return max(ACCEPTED_FURTHER_GAIN, FURTHER_SHARE * (nothing - current.cost))
 
 
 @dataclass(frozen=True)
@@ -97,6 +119,11 @@ def _total(candidate: Fit) -> float:
     return candidate.cost + parameter_cost(candidate.terms, candidate.active)
 
 
+def value_at(term: Term, parameter: Parameter) -> float:
+    """Fitted value of a parameter."""
+    return float(term.values[parameter.name])
+
+
 def _plausible(candidate: Fit) -> bool:
     """Whether the newest term is large enough to matter and its parameters are determined.
 
@@ -109,6 +136,8 @@ def _plausible(candidate: Fit) -> bool:
         if parameter.healthy is None or parameter.minimum <= 0.0:
             continue
         margin = 0.005 * (parameter.high - parameter.low)
+        if parameter.healthy == 1.0 and value_at(term, parameter) > 0.85 * parameter.high:
+            return False
         value = term.values[parameter.name]
         at_bound = value < parameter.low + margin or value > parameter.high - margin
         if at_bound and abs(value - parameter.healthy) > margin:
@@ -159,11 +188,32 @@ def _window_starts(
     return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
 
 
+def _is_a_stall(searcher: Searcher, current: Fit, start: Term) -> bool:
+    """Whether a rotor's silence is what a braked bearing does in the wind of that time.
+
+    A bearing that sticks lets go later than the simulated friction does.
+    """
+    braked = any(t.effect.name == "bearing_friction" for t in current.terms)
+    if start.effect.name != "stuck_sensor" or not braked:
+        return False
+    comparison = searcher.comparison
+    for channel in comparison.channels:
+        if channel.instrument == start.instrument and channel.kind == "rotor_rate":
+            at = comparison.grid.centres + comparison.drive.elapsed
+            inside = (at > start.values["start"]) & (at < start.values["stop"])
+            if not inside.any():
+                return False
+            return float(np.median(comparison.speed[inside])) < STALL_SPEED
+    return False
+
+
 def refined_interval(
     searcher: Searcher, whitener: Whitener, fixed: Sequence[Term], candidate: Fit
 ) -> Fit:
     """The fit with its last term's beginning and end moved to where they fit best."""
     best = candidate
+    comparison = searcher.comparison
+    length = comparison.grid.n * comparison.grid.dt + comparison.drive.elapsed
     for step in (15.0, 5.0, 2.0):
         for side in (0, 1):
             for direction in (-1.0, 1.0):
@@ -176,6 +226,10 @@ def refined_interval(
                         interval = (start, stop + direction * step)
                     else:
                         break
+                    if interval[0] < NEAR_AN_END:
+                        interval = (0.0, interval[1])
+                    if interval[1] is not None and interval[1] > length - NEAR_AN_END:
+                        interval = (interval[0], None)
                     if interval[1] is not None and interval[1] - interval[0] < 5.0:
                         break
                     moved = replace(term, interval=interval)
@@ -215,7 +269,7 @@ def name(
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, current.vector, number)
-            if starts[0].key not in used
+            if starts[0].key not in used and not _is_a_stall(searcher, current, starts[0])
         ]
         windowed = _window_starts(searcher, whitener, current.vector, used)
         if not first and not windowed:
@@ -227,7 +281,8 @@ def name(
                 break
         fits = searcher.fit_all(whitener, fixed, [*candidates, *windowed])
         fits = sorted((f for f in fits if _plausible(f)), key=_total)
-        needed = ACCEPTED_GAIN if first else ACCEPTED_FURTHER_GAIN
+        nothing_now = whitener.of(searcher.bank.without)
+        needed = _needed(current, float(nothing_now @ nothing_now), first)
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
         if not fits or _total(current) - _total(fits[0]) < needed:

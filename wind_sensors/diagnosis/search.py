@@ -36,7 +36,10 @@ LEAST_SHARE = 0.03
 PENALTY_PER_PARAMETER = 3.0
 """Cost of one more parameter, in units of the squared white vector."""
 
-PENALTY_PER_INTERVAL = 9.0
+PENALTY_PER_FURTHER_PARAMETER = 4.0
+"""The same for the second and later parameters of an effect."""
+
+PENALTY_PER_INTERVAL = 10.0
 """Cost of a beginning or an end inside the record."""
 
 

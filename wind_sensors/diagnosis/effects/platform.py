@@ -7,7 +7,6 @@ from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
 from wind_sensors.station.model import (
-    Downwash,
     HeadingDeviation,
     Instrument,
     Platform,
@@ -47,7 +46,8 @@ PLATFORM_VELOCITY = Effect(
 
 
 def _velocity_scale(entry: Entry, values: Values) -> dict[str, Any]:
-    return {"velocity_scale": values["velocity_scale"]}
+    assert isinstance(entry, Platform)
+    return {"velocity_scale": entry.velocity_scale * values["velocity_scale"]}
 
 
 PLATFORM_VELOCITY_SCALE = Effect(
@@ -103,9 +103,13 @@ LEVER_ARM = Effect(
 
 
 def _deviation(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Platform)
+    stated = entry.heading_deviation
     return {
         "heading_deviation": HeadingDeviation.model_construct(
-            constant_deg=values["constant"], sine_deg=values["sine"], cosine_deg=values["cosine"]
+            constant_deg=stated.constant_deg + values["constant"],
+            sine_deg=stated.sine_deg + values["sine"],
+            cosine_deg=stated.cosine_deg + values["cosine"],
         )
     }
 
@@ -187,9 +191,14 @@ FRAME_ERROR = Effect(
 
 
 def _downwash(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Platform)
+    stated = entry.downwash
     return {
-        "downwash": Downwash.model_construct(
-            induced_velocity=values["induced_velocity"], wake_skew=values["wake_skew"]
+        "downwash": stated.model_copy(
+            update={
+                "induced_velocity": stated.induced_velocity + values["induced_velocity"],
+                "wake_skew": stated.wake_skew + values["wake_skew"],
+            }
         )
     }
 
@@ -198,8 +207,8 @@ ROTOR_DOWNWASH = Effect(
     name="rotor_downwash",
     meaning="The inflow of the carrier's own rotors reaches the sensor.",
     entrance="wind",
-    equation="w' = w - v_i; u' = u - skew * v_i along the airspeed",
-    source="momentum theory of the hovering rotor",
+    equation="w' = w - v_i; u' = u + skew * v_i / |v_h| * u; v_i sqrt(u^2 + v_i^2) = v_h^2",
+    source="Glauert's momentum theory of a rotor in forward flight",
     region="strongest at low airspeed",
     parameters=(
         Parameter("induced_velocity", "m/s", -5.0, 15.0, minimum=0.3, step=0.1),
