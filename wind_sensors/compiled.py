@@ -1,8 +1,14 @@
-"""The one place that decides how numeric kernels are compiled."""
+"""The one place that decides how numeric kernels are compiled and where they are kept."""
 
 from __future__ import annotations
 
+import hashlib
+import os
+import shutil
+import tempfile
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -10,11 +16,53 @@ import numba
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+@cache
+def _kernel_folder(package: Path) -> str:
+    """Where the machine code of a package's kernels is kept.
+
+    A kernel contains the kernels that it calls, but the compiler's own cache watches only the file
+    in which it stands. The folder is therefore named after the text of all kernel files together:
+    after any change everything is compiled again, and nothing stale is ever run.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        if b"@compiled" in text:
+            digest.update(path.relative_to(package).as_posix().encode())
+            digest.update(text)
+    name = f"kernels-{digest.hexdigest()[:16]}"
+    beside = package / "__pycache__"
+    if not (beside / name).exists() and _writable(beside):
+        for stale in beside.glob("kernels-*"):
+            shutil.rmtree(stale, ignore_errors=True)
+    users = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for folder in (beside, users / "wind_sensors", Path(tempfile.gettempdir()) / "wind_sensors"):
+        if _writable(folder / name):
+            return str(folder / name)
+    return ""
+
+
 def compiled(function: _Function) -> _Function:
     """Compile a numeric kernel to machine code, keeping its type signature.
 
-    The compiled code is cached beside the source, so that only the first run after an
-    installation pays for the compilation. Floating-point semantics stay strict (no reassociation),
-    because the same input must give the same bits live and offline.
+    The machine code is kept between runs, so that only the first run after an installation pays
+    for the compilation. Floating-point semantics stay strict (no reassociation), because the same
+    input must give the same bits live and offline.
     """
-    return cast(_Function, numba.njit(cache=True, error_model="numpy")(function))
+    depth = function.__module__.count(".")
+    package = Path(function.__code__.co_filename).resolve().parents[max(depth - 1, 0)]
+    settings: Any = numba.config
+    before = settings.CACHE_DIR
+    settings.CACHE_DIR = _kernel_folder(package)
+    try:
+        return cast(_Function, numba.njit(cache=True, error_model="numpy")(function))
+    finally:
+        settings.CACHE_DIR = before
