@@ -41,7 +41,8 @@ NEAR_AN_END = 8.0
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
 WINDOW_CANDIDATES = 4
-WINDOW_ADVANTAGE = 12.0
+WINDOW_ADVANTAGE = 15.0
+SMOOTHING_WINDOW_ADVANTAGE = 120.0
 LEAST_WINDOW_GAIN = 4.0
 FINALISTS = 5
 FAR_BEHIND = 0.6
@@ -171,7 +172,12 @@ def _window_starts(
         gain, window, amplitude, which = screen_windows(
             whitener, searcher.bank, strong, vector
         )
-        if window is None or gain < score.gain + WINDOW_ADVANTAGE:
+        advantage = (
+            SMOOTHING_WINDOW_ADVANTAGE
+            if searcher.effects[score.effect].smooths
+            else WINDOW_ADVANTAGE
+        )
+        if window is None or gain < score.gain + advantage:
             continue
         template = searcher.bank.templates[which]
         values = dict(template.values)

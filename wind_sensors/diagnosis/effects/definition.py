@@ -73,6 +73,8 @@ class Effect:
         everywhere: It concerns all the instruments it applies to at once (the mount, the air).
         standing: Share of the smallest size worth reporting at which it is taken to be present on
             any healthy day, whatever healthy recordings say; 0 for what is there or is not.
+        smooths: It damps or delays what the wind does. Errors of the reference that come and go
+            look like that, so a beginning or an end inside the record needs more evidence.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.
@@ -90,6 +92,7 @@ class Effect:
     templates: tuple[dict[str, float], ...]
     confusable: Mapping[str, str] = field(default_factory=dict)
     everywhere: bool = False
+    smooths: bool = False
     standing: float = 0.1
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None

@@ -179,6 +179,7 @@ TIMESTAMP_LATENCY = Effect(
     equation="stamp = time of measurement + latency",
     source="definition",
     region="phase of the cross-spectrum, in proportion to frequency",
+    smooths=True,
     parameters=(
         Parameter("latency", "s", -60.0, 60.0, minimum=0.15, step=0.05, starts=(0.3, 1.0, -0.5)),
     ),
@@ -205,6 +206,7 @@ CLOCK_DRIFT = Effect(
     equation="stamp = time of measurement * (1 + drift)",
     source="definition",
     region="a lag that grows with the length of the record",
+    smooths=True,
     parameters=(
         Parameter(
             "drift", "ppm", -20000.0, 20000.0, minimum=300.0, step=50.0,

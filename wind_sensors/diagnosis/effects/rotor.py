@@ -113,6 +113,7 @@ AIR_DENSITY = Effect(
     equation="l0 = l0_cal * rho_cal / rho; friction weighs rho_cal / rho as much",
     source="K94, eq. (6)",
     region="with temperature and pressure; response length and low speeds",
+    smooths=True,
     parameters=(
         Parameter("density_ratio", "1", 0.4, 2.5, healthy=1.0, minimum=0.1, step=0.04),
     ),
@@ -139,6 +140,7 @@ ROTOR_INERTIA = Effect(
     equation="l0 = factor * l0_cal",
     source="K94, eqs. (6), (8)",
     region="high frequencies; k l0 near and above 1",
+    smooths=True,
     parameters=(
         Parameter(
             "inertia_factor", "1", 0.2, 12.0, healthy=1.0, minimum=0.3, step=0.1,
@@ -162,6 +164,7 @@ TORQUE_ASYMMETRY = Effect(
     equation="l0 dy/dt = (A - y)(a4 A + (1 - a4) y)",
     source="K94, eqs. (1), (2); K14, eq. (76)",
     region="mean speed and skewness in strong turbulence",
+    smooths=True,
     parameters=(
         Parameter("a4", "1", 0.05, 2.5, healthy=1.0, minimum=0.4, step=0.1),
     ),
@@ -249,6 +252,7 @@ ICING = Effect(
     source="K94, eq. (6)",
     region="near and below 0 deg C; all speeds and high frequencies",
     standing=0.0,
+    smooths=True,
     parameters=(
         Parameter("gain", "1", 0.2, 1.1, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(

@@ -55,6 +55,7 @@ VANE_INERTIA = Effect(
     equation="l_v^2 = factor * l_v,cal^2, damping ratio / sqrt(factor)",
     source="K94, eqs. (36) to (39)",
     region="near and above the vane's resonance, U/(2 pi l_v)",
+    smooths=True,
     parameters=(
         Parameter(
             "inertia_factor", "1", 0.2, 20.0, healthy=1.0, minimum=0.4, step=0.1,
@@ -84,6 +85,7 @@ VANE_DAMPING = Effect(
     equation="zeta = factor * zeta_cal",
     source="K94, eq. (40)",
     region="near the vane's resonance, U/(2 pi l_v)",
+    smooths=True,
     parameters=(
         Parameter(
             "damping_factor", "1", 0.05, 12.0, healthy=1.0, minimum=0.4, step=0.1,
@@ -254,6 +256,7 @@ LOW_PASS_FILTER = Effect(
     equation="tau d(reading)/dt + reading = phi",
     source="first-order filter",
     region="high frequencies, the same at all wind speeds",
+    smooths=True,
     parameters=(
         Parameter("time_constant", "s", 0.0, 20.0, minimum=0.1, step=0.05, starts=(0.3, 1.0)),
     ),

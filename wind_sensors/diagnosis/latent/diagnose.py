@@ -314,7 +314,7 @@ def _panels(felt: Felt, before: Station, after: Station) -> tuple[Panel, ...]:
     compass = np.mod(90.0 - np.degrees(heading_of(felt.motion)), 360.0)
     sector = np.floor(compass / 30.0).astype(np.intp)
     filled = np.bincount(sector, minlength=12) > 20
-    at = (np.arange(12) * 30.0 + 15.0)[filled]
+    at = np.asarray((np.arange(12) * 30.0 + 15.0)[filled], dtype=np.float64)
     size = np.maximum(np.bincount(sector, minlength=12), 1)
     by = [np.sqrt(np.bincount(sector, r**2, 12) / size)[filled] for r in (one, two)]
     return (

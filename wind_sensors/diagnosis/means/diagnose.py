@@ -30,7 +30,7 @@ from wind_sensors.diagnosis.means.pair import (
     table_of,
 )
 from wind_sensors.diagnosis.means.pair_effects import rotor_effects
-from wind_sensors.diagnosis.means.search import Named, bench_of, intervals, search
+from wind_sensors.diagnosis.means.search import Named, bench_of, intervals, is_normal, search
 from wind_sensors.diagnosis.means.vanes import (
     VaneStanding,
     vane_bench,
@@ -160,7 +160,13 @@ def diagnose_means(
         standing = healthy.pairs.get((first, second)) if healthy is not None else None
         pair = pair_of(averages, first, second, standing)
         bench = bench_of(pair, recording.station)
-        explained = search(bench, rotor_effects(), (first, second), along)
+        normal = None
+        if healthy is not None:
+            usual = pair_of(healthy.averages, first, second, standing)
+            normal = is_normal(bench_of(usual, recording.station))
+        explained = search(
+            bench, rotor_effects(), (first, second), along, normal=normal
+        )
         others = [r for p in pairs for r in p if r not in (first, second)]
         named = [
             _attributed(n, healthy, averages, (first, second), others) for n in explained.named
@@ -182,10 +188,10 @@ def diagnose_means(
         shown += panels.of_pair(pair, recording.station, explained.terms)
         report(phase, 1.0)
     for vane in averages.heading:
-        normal = healthy.vanes.get(vane) if healthy is not None else None
-        if healthy is not None and normal is None:
+        turned = healthy.vanes.get(vane) if healthy is not None else None
+        if healthy is not None and turned is None:
             continue
-        found = vane_bench(averages, recording.station, vane, normal)
+        found = vane_bench(averages, recording.station, vane, turned)
         if found is None:
             declined.append(f"{vane}: no other vane works long enough to compare it with.")
             continue
@@ -195,7 +201,7 @@ def diagnose_means(
         explained = search(
             found.bench, effects, (vane,), None, 2, (turning,) if healthy is None else ()
         )
-        own, notes = findings_of_vane(found, explained, normal, len(averages.heading))
+        own, notes = findings_of_vane(found, explained, turned, len(averages.heading))
         findings += own
         declined += notes
         terms += [f.term for f in own]

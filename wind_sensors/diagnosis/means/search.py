@@ -38,6 +38,10 @@ their place; below this share of it they are not worth a parameter."""
 SMALLEST_GAIN = 0.005
 """Share of the whole cost that a term must remove from held-out blocks."""
 
+HEALTHY_PARTS = 3
+HEALTHY_FACTOR = 2.5
+"""A finding must be so many times as large as the largest in the parts of a healthy record."""
+
 MOST_TERMS = 7
 CANDIDATES = 9
 DRAWS = 999
@@ -378,11 +382,12 @@ def search(
     progress: Callable[[float], None] | None = None,
     most: int = MOST_TERMS,
     given: Sequence[Term] = (),
+    normal: Callable[[Term], bool] | None = None,
 ) -> Explained:
     """Add effects while they explain held-out blocks.
 
     With `given` terms, which are fitted along but not named, only beginnings and endings are
-    looked for.
+    looked for. A term that is `normal` on healthy days is not accepted.
 
     A term is accepted when the family-wide p value of its screening and the t value of its gain
     over held-out blocks say so, whatever its size.
@@ -425,6 +430,9 @@ def search(
             else:
                 others.append((other, 0.5 * float(behind.sum())))
                 runner = its_gain if runner is None else runner
+        if normal is not None and normal(best):
+            refused.add(best.key)
+            continue
         together = fit(bench, (), (*terms, best), bench.everything)
         if not all(_inside(t) for t in together[len(given) :]):
             # Two names for one thing push each other out of what is possible.
@@ -439,6 +447,28 @@ def search(
         if progress:
             progress(len(named) / most)
     return Explained(terms, tuple(named), tuple(costs), p)
+
+
+def is_normal(healthy: Bench) -> Callable[[Term], bool]:
+    """Whether a term is no larger than what healthy days show between themselves.
+
+    The same effect is fitted to each third of the healthy record, after the record's standing
+    difference has been taken out.
+    """
+    third = healthy.block * HEALTHY_PARTS // healthy.blocks
+    sizes: dict[tuple[str, str], float] = {}
+
+    def normal(term: Term) -> bool:
+        if term.key not in sizes:
+            start = replace(term, interval=ALWAYS)
+            found = [
+                fit(healthy, (), (start,), third == k, 4)[0].relative_size
+                for k in range(HEALTHY_PARTS)
+            ]
+            sizes[term.key] = max(found)
+        return term.relative_size < HEALTHY_FACTOR * sizes[term.key]
+
+    return normal
 
 
 def _inside(term: Term) -> bool:
