@@ -1,0 +1,70 @@
+"""The inflow of a multirotor's own rotors, named from flight data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.recordings.station_files import load_station
+from wind_sensors.simulation import Scenario, simulate
+from wind_sensors.simulation.trajectories import multirotor
+from wind_sensors.station.model import Downwash, Input, Reference, Station
+from wind_sensors.station.signals import Recording
+from wind_sensors.turbulence.synthesis import isotropic_spec
+
+
+def uav(**downwash: float) -> Station:
+    """The ready multirotor beside a reference, with the inflow stated here alone."""
+    ready = load_station("multirotor")
+    assert ready.platform is not None
+    platform = ready.platform.model_copy(update={"downwash": Downwash(**downwash)})
+    reference = Reference(topic=Input(topic="/reference/wind"), separation=0.5)
+    return ready.model_copy(update={"platform": platform, "reference": reference})
+
+
+def flown(station: Station, seed: int) -> Recording:
+    """Legs at 3 m/s in a wind of its own, read with the station that knows of no inflow."""
+    rng = np.random.default_rng(seed)
+    wind = isotropic_spec(
+        rng.uniform(4.0, 8.0), 0.15, 60.0, direction=rng.uniform(-3.0, 3.0), seed=seed
+    )
+    trajectory = multirotor(speed=3.0, seed=seed)
+    recording = simulate(
+        station, Scenario(wind, duration=400.0, seed=seed, trajectory=trajectory)
+    )
+    return replace(recording, station=uav(), truth=None)
+
+
+def test_a_flight_tells_the_inflow_of_its_rotors() -> None:
+    baseline = learn([flown(uav(), seed) for seed in range(3)])
+    found = diagnose(flown(uav(induced_velocity=2.0, wake_skew=0.3), 50), baseline)
+    assert found.verdict == "named"
+    (finding,) = found.findings
+    assert finding.term.key == ("rotor_downwash", "platform")
+    for key, planted in (("induced_velocity", 2.0), ("wake_skew", 0.3)):
+        estimate = finding.parameters[key]
+        assert estimate.value == pytest.approx(planted, rel=0.15)
+        assert estimate.low < planted < estimate.high
+    assert finding.proof is not None
+    assert finding.proof.excess_removed > 0.8
+
+
+def test_an_effect_adds_to_what_a_station_already_states() -> None:
+    stated = uav(thrust=20.0, disc_area=0.5, sensor_share=0.2, wake_skew=0.1)
+    more = with_effect(
+        stated,
+        catalogue()["rotor_downwash"],
+        "platform",
+        {"induced_velocity": 0.5, "wake_skew": 0.2},
+    )
+    assert more.platform is not None
+    found = more.platform.downwash
+    assert (found.thrust, found.disc_area, found.sensor_share) == (20.0, 0.5, 0.2)
+    assert found.induced_velocity == 0.5
+    assert found.wake_skew == pytest.approx(0.3)
