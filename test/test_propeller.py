@@ -11,6 +11,12 @@ from scipy import integrate
 
 from wind_sensors.instruments import friction_propeller as jackson
 from wind_sensors.instruments import propeller, propeller_turbulence
+from wind_sensors.instruments.dynamics.rotor import (
+    PROPELLER_JACKSON,
+    PROPELLER_KRISTENSEN_1994,
+    RotorParameters,
+)
+from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
 from wind_sensors.instruments.friction_propeller import FrictionPropeller
 from wind_sensors.turbulence import von_karman
 
@@ -200,3 +206,45 @@ def test_kristensen_propeller() -> None:
         float(propeller.steady_response(small, mu2)), abs=1e-6
     )
     assert propeller.fixed_propeller_bias(mu2, 0.3, 0.1, 5.0) == pytest.approx(-0.0056)
+
+
+def gain_of_kernel(form: int, angle: float, wave: float, across: bool) -> complex:
+    """Response of the compiled equation to a small sinusoid, per unit of the gust."""
+    speed, length, count = 5.0, 1.1, 200
+    dt = 2.0 * math.pi * length / (wave * speed) / count
+    phase = 2.0 * math.pi * np.arange(20 * count) / count
+    gust = 1e-3 * np.sin(phase)
+    along = speed + (0.0 if across else 1.0) * gust
+    sideways = (1.0 if across else 0.0) * gust
+    axial = along * math.cos(angle) + sideways * math.sin(angle)
+    transverse = along * math.sin(angle) - sideways * math.cos(angle)
+    table = np.cos(np.radians(np.arange(181.0)))
+    friction = ROTOR.stall_speed**2 if form == PROPELLER_JACKSON else 0.0
+    a4 = 1.0 if form == PROPELLER_JACKSON else 0.0
+    parameters = RotorParameters(
+        form, 0.2, 0.0, length, a4, 0.0, -0.3, table, 1.0, 0.0, friction, 0.0, 15.0, 1.0, 0.0, 0.0
+    )
+    y, _ = integrate_rotor(
+        parameters, axial, transverse, np.zeros(axial.size), np.ones(axial.size),
+        np.full(axial.size, 15.0), dt, 1, math.nan, 0.0,
+    )  # fmt: skip
+    last = slice(-2 * count, None)
+    return complex(2.0 * np.mean(y[last] * 1j * np.exp(-1j * phase[last])) / 1e-3)
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 25.0, 40.0])
+@pytest.mark.parametrize("across", [False, True])
+def test_oblique_transfer_functions_are_those_of_the_equations(
+    angle_deg: float, across: bool
+) -> None:
+    angle = math.radians(angle_deg)
+    for wave in (0.3, 1.0, 3.0):
+        found = gain_of_kernel(PROPELLER_KRISTENSEN_1994, angle, wave, across)
+        expected = propeller.transfer_function(wave, angle, -0.3)[int(across)]
+        assert found == pytest.approx(expected, abs=2e-3)
+        found = gain_of_kernel(PROPELLER_JACKSON, angle, wave, across)
+        # The kernel's response table is linear from degree to degree.
+        expected = propeller_turbulence.transfer_function(wave, 5.0, angle, ROTOR)[int(across)]
+        assert found == pytest.approx(expected, abs=1e-2)
+    axial = propeller_turbulence.transfer_function(1.0, 5.0, 0.0, ROTOR)
+    assert axial[0] == pytest.approx(propeller_turbulence.sinusoidal_gain(1.0, 0.3 / 5.0))

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from wind_sensors.instruments import rotor_family
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 
 def angular_acceleration(
@@ -75,6 +76,27 @@ def oblique_response_length_ratio(angle: npt.ArrayLike, mu2: float) -> FloatArra
     theta = np.asarray(angle, dtype=np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         return 1.0 / np.sqrt(np.cos(theta) ** 2 + 2.0 * mu2 * np.sin(theta) ** 2)
+
+
+def transfer_function(reduced_wavenumber: npt.ArrayLike, angle: float, mu2: float) -> ComplexArray:
+    """l s'/(u', v') [1] of a fixed propeller in a steady oblique wind (derived from K94 (30)).
+
+    Args:
+        reduced_wavenumber: k l0 [1], shape (n,).
+        angle: Of the mean wind to the axis [rad], smaller than `critical_angle`.
+        mu2: Curvature of the angular response.
+
+    Returns:
+        Shape (n, 2): for gusts along the mean wind, and across it in the plane of wind and axis,
+        positive where they turn the wind towards the axis. 1/(1 + i k l0) and 0 in axial flow.
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    rate = float(steady_response(angle, mu2))
+    along = rate * c + mu2 * s * s
+    across = rate * s - mu2 * s * c
+    k = np.asarray(reduced_wavenumber, dtype=np.float64)
+    slowness = 1.0 / float(oblique_response_length_ratio(angle, mu2)) + 1j * k
+    return np.stack([along / slowness, across / slowness], axis=-1)
 
 
 def fixed_propeller_bias(

@@ -10,9 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.instruments.filtered_turbulence import longitudinal_loss
+from wind_sensors.instruments.friction_propeller import FrictionPropeller
 from wind_sensors.instruments.periodic import PeriodicRate, periodic_rate
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_SMALL_ANGLE = 1e-5
+"""Step of the derivatives of f and g [rad]."""
 
 
 def mean_excess_von_karman(reduced_length: npt.ArrayLike, stall_ratio: float) -> FloatArray:
@@ -39,6 +44,37 @@ def sinusoidal_gain(reduced_frequency: float, stall_ratio: float) -> complex:
         stall_ratio: U_s/U [1].
     """
     return (1.0 + stall_ratio**2) / (1.0 + 1j * reduced_frequency)
+
+
+def transfer_function(
+    reduced_wavenumber: npt.ArrayLike, speed: float, angle: float, propeller: FrictionPropeller
+) -> ComplexArray:
+    """P omega'/(u', v') [1] of a fixed propeller in a steady oblique wind (derived from (5)).
+
+    A = U f and B = U g/g(0) vary with the gust; friction adds U_s^2/B^2 times the variation of B.
+
+    Args:
+        reduced_wavenumber: k L [1], shape (n,).
+        speed: U [m/s].
+        angle: theta [rad], outside the dead sector, below 90 degrees.
+        propeller: Constants.
+
+    Returns:
+        Shape (n, 2): for gusts along the mean wind, and across it in the plane of wind and axis,
+        positive where they turn the wind towards the axis.
+    """
+    near = np.array([angle - _SMALL_ANGLE, angle + _SMALL_ANGLE])
+    f, g = float(propeller.f(angle)), float(propeller.g(angle))
+    f_slope, g_slope = (
+        float(np.diff(np.asarray(h(near)))[0]) / (2.0 * _SMALL_ANGLE)
+        for h in (propeller.f, propeller.g)
+    )
+    friction = (propeller.stall_speed / (speed * g)) ** 2
+    k = np.asarray(reduced_wavenumber, dtype=np.float64)
+    slowness = 1.0 + 1j * k / g
+    along = (f + friction * g) / slowness
+    across = -(f_slope + friction * g_slope) / slowness
+    return np.stack([along, across], axis=-1)
 
 
 def sinusoidal_rate(

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy import signal
 
-from wind_sensors.instruments import cup, vane, vane_variance
+from wind_sensors.instruments import cup, cup_vane, vane, vane_variance
 from wind_sensors.report.paper_figures.style import (
     BLUE,
     GREEN,
@@ -19,6 +20,9 @@ from wind_sensors.report.paper_figures.style import (
     single,
 )
 from wind_sensors.turbulence import surface_layer
+
+_RUN_PER_RADIAN = 0.2
+"""Of K94's cup [m/rad]."""
 
 
 def first_order_step(figure: Figure) -> None:
@@ -171,6 +175,25 @@ def recovered_fraction(figure: Figure) -> None:
     axes.set_xlim(1.0, 3.0)
     axes.set_ylim(0.0, 1.05)
     legend(axes, "lower left")
+
+
+def vector_run(figure: Figure) -> None:
+    """Fig. 14: the vane's heading at every turn of the cup, summed up to the vector wind run."""
+    axes = single(figure, "towards east [m]", "towards north [m]")
+    generator = np.random.Generator(np.random.PCG64(14))
+    steps = generator.normal(0.0, math.radians(12.0), 30)
+    headings = math.radians(40.0) + signal.lfilter([1.0], [1.0, -0.8], steps)
+    per_turn = 2.0 * math.pi * _RUN_PER_RADIAN
+    path = np.cumsum(per_turn * np.stack([np.cos(headings), np.sin(headings)]), axis=1)
+    path = np.concatenate([np.zeros((2, 1)), path], axis=1)
+    run = cup_vane.vector_wind_run(headings, 1.0, _RUN_PER_RADIAN)
+    axes.plot(path[0], path[1], "o-", color=BLUE, markersize=3, label="one step a turn of the cup")
+    axes.plot(
+        [0.0, run.east], [0.0, run.north], color=ORANGE,
+        label=f"vector run {run.speed:.1f} m of {run.scalar_speed:.1f} m",
+    )  # fmt: skip
+    axes.set_aspect("equal")
+    legend(axes, "upper left")
 
 
 def surface_layer_function(figure: Figure) -> None:

@@ -33,6 +33,7 @@ FIGURES: dict[str, PaperFigure] = {
     "k94-11": PaperFigure("The same, slope 5/3", k94.spectrum_five_thirds),
     "k94-12": PaperFigure("The same, slope 2", k94.spectrum_two),
     "k94-13": PaperFigure("Variance regained by resonance", k94.recovered_fraction),
+    "k94-14": PaperFigure("The vector wind run", k94.vector_run),
     "k94-16": PaperFigure("Propeller-vane in the surface layer", k94.surface_layer_function),
     "k14-2": PaperFigure("The von Kármán spectrum", k14.longitudinal_spectrum),
     "k14-3": PaperFigure("Structure functions", k14.structure_functions),
