@@ -20,6 +20,7 @@ from wind_sensors.estimation import (
     WindowStatistics,
     process,
 )
+from wind_sensors.estimation.constants import measures_vertical
 from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.writing import clear_target
 
@@ -127,11 +128,17 @@ def _report(console: Console, result: ProcessedRecording) -> None:
     start = result.recording.start
     table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")
     table.add_column("window [s]")
-    for heading in ("mean speed [m/s]", "vector mean [m/s]", "from [deg]", "turbulence u, v [m/s]",
+    with_vertical = measures_vertical(result.recording.station)
+    components = 3 if with_vertical else 2
+    turbulence = f"turbulence {', '.join('uvw'[:components])} [m/s]"
+    for heading in ("mean speed [m/s]", "vector mean [m/s]", "from [deg]", turbulence,
                     "direction spread [deg]"):  # fmt: skip
         table.add_column(heading, justify="right")
+    if with_vertical:
+        table.add_column("upwards [m/s]", justify="right")
     for window in result.windows:
-        table.add_row(*_cells(window, start))
+        lift = [_lift(window)] if with_vertical else []
+        table.add_row(*_cells(window, start, components), *lift)
     console.print(table)
     biases = Table(title="bias of the raw mean speed [% of the mean speed]", title_justify="left")
     biases.add_column("window [s]")
@@ -149,10 +156,16 @@ def _report(console: Console, result: ProcessedRecording) -> None:
 
 
 def _span(window: WindowStatistics, start: int) -> str:
-    return f"{(window.start - start) * 1e-9:.0f} - {(window.stop - start) * 1e-9:.0f}"
+    return f"{round((window.start - start) * 1e-9)} - {round((window.stop - start) * 1e-9)}"
 
 
-def _cells(window: WindowStatistics, start: int) -> list[str]:
+def _lift(window: WindowStatistics) -> str:
+    """Mean vertical wind with its uncertainty."""
+    deviation = math.sqrt(max(float(window.vector_mean_covariance[2, 2]), 0.0))
+    return f"{window.vector_mean[2]:+.3f} ± {deviation:.3f}"
+
+
+def _cells(window: WindowStatistics, start: int, components: int) -> list[str]:
     """Mean, direction, turbulence of one window as text with uncertainties."""
     east, north = float(window.vector_mean[0]), float(window.vector_mean[1])
     along = math.sqrt(max(float(window.vector_mean_covariance[0, 0]), 0.0))
@@ -163,6 +176,6 @@ def _cells(window: WindowStatistics, start: int) -> list[str]:
         f"{window.scalar_mean:.3f} ± {window.scalar_mean_uncertainty:.3f}",
         f"{math.hypot(east, north):.3f} ± {along:.3f}",
         f"{comes_from:.1f} ± {math.degrees(window.direction_uncertainty):.1f}",
-        f"{window.turbulence[0]:.2f}, {window.turbulence[1]:.2f}",
+        ", ".join(f"{deviation:.2f}" for deviation in window.turbulence[:components]),
         f"{spread:.1f}",
     ]
