@@ -300,3 +300,21 @@ def test_a_platform_that_was_never_heard_of_is_said_so_and_no_wind_is_made_up() 
     assert found.time.size == 0
     assert health(found, "motion")[0] == HealthLevel.ERROR
     assert health(found, "platform")[0] == HealthLevel.STALE
+
+
+def test_an_unsure_mounting_makes_the_mean_direction_as_unsure_and_hardly_the_speed() -> None:
+    """A sensor that may be turned by 3 degrees may have turned the felt wind by 3 degrees."""
+    straight = Trajectory("hold", speed=0.0)
+    known, unsure = (
+        process(
+            sailed(moving_station(mounting_noise_deg=degrees), straight, duration=100.0),
+            EstimatorSettings(window=100.0),
+        ).windows[0]
+        for degrees in (0.0, 3.0)
+    )
+    added = np.sqrt(unsure.direction_uncertainty**2 - known.direction_uncertainty**2)
+    assert np.degrees(added) == pytest.approx(3.0, rel=0.03)
+    # Roll and pitch are unsure too, but they only lift the horizontal wind.
+    along = np.array([np.cos(unsure.direction), np.sin(unsure.direction), 0.0])
+    grown = unsure.vector_mean_covariance - known.vector_mean_covariance
+    assert along @ grown @ along < 0.02 * np.trace(grown[:2, :2])

@@ -42,6 +42,7 @@ class _Sums:
     products: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     own_trace: float = 0.0
+    mount: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     speed: float = 0.0
     pointing: FloatArray = field(default_factory=lambda: np.zeros(2))
     along: float = 0.0
@@ -118,7 +119,10 @@ class WindowAccumulator:
         s.velocity += v.sum(axis=0)
         s.products += np.einsum("ni,nj->ij", v, v)
         s.covariance += p.sum(axis=0)
-        s.own_trace += float(np.trace(estimates.apparent_covariance[part], axis1=1, axis2=2).sum())
+        own = estimates.apparent_covariance[part]
+        turn = estimates.to_earth[part]
+        s.own_trace += float(np.trace(own, axis1=1, axis2=2).sum())
+        s.mount += (p - turn @ own @ turn.transpose(0, 2, 1)).sum(axis=0)
         s.speed += float(np.sum(h + 0.5 * across / safe))
         s.pointing += (east.sum(), north.sum())
         if small is not None:
@@ -222,14 +226,14 @@ class WindowAccumulator:
         """
         own = s.own_trace / s.count / 3.0
         total = s.covariance / s.count
-        mount = max(float(np.trace(total)) / 3.0 - own, 0.0)
         averaged = own * min(_CORRELATION_TIME / duration, 1.0)
         local = abs(raw_speed - speed) if self._station.platform is None else 0.0
         correction = _CORRECTION_UNCERTAINTY * max(float(np.hypot(bias[0], bias[1])), local)
         bias_covariance = np.diag([correction**2, correction**2, 0.0])
         mean_covariance = np.eye(3) * (
-            averaged + mount + (_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2
+            averaged + (_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2
         )
+        mean_covariance += s.mount / s.count
         if not self._vertical_is_measured:
             mean_covariance[2, 2] = total[2, 2]
         return mean_covariance, bias_covariance
