@@ -69,8 +69,6 @@ class Baseline:
         means: Amplitude of each template shared by the healthy recordings, by
             `effect|instrument|template number`, in units of the template.
         standing: Scatter of each template's amplitude between them.
-        remainder_scale: Largest remainders on the healthy recordings relative to those of drawn
-            white noise.
     """
 
     recordings: tuple[str, ...]
@@ -78,7 +76,6 @@ class Baseline:
     channels: Mapping[str, ChannelBaseline]
     means: Mapping[str, float] = field(default_factory=dict)
     standing: Mapping[str, float] = field(default_factory=dict)
-    remainder_scale: float = 1.0
 
     @property
     def calibrated(self) -> bool:
@@ -96,7 +93,6 @@ class Baseline:
             },
             "means": dict(self.means),
             "standing": dict(self.standing),
-            "remainder_scale": self.remainder_scale,
         }
         return json.dumps(content, indent=1)
 
@@ -118,7 +114,6 @@ class Baseline:
                 },
                 means=content["means"],
                 standing=content["standing"],
-                remainder_scale=float(content["remainder_scale"]),
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem

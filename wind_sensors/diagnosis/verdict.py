@@ -43,7 +43,7 @@ exact enough to tell them apart."""
 LEAST_LIKENESS = 0.6
 """Cosine between the white corrections of two explanations of the same thing."""
 
-REMAINDER_SCORES = {"frequency": 200.0, "spectrum": 45.0}
+REMAINDER_SCORES = {"frequency": 200.0, "spectrum": 60.0, "statistic": 60.0}
 """Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
 raise the power of a band on healthy days, too."""
 
@@ -191,11 +191,9 @@ def _alike(naming: Naming, alternative: Alternative) -> bool:
     return cosine > LEAST_LIKENESS
 
 
-def _remainder(
-    naming: Naming, bank: RegionBank, calibration: float
-) -> tuple[float, float, float]:
+def _remainder(naming: Naming, bank: RegionBank) -> tuple[float, float, float]:
     """Largest remaining score relative to its limit, its p value, its share of the misfit."""
-    scores = bank.scores(naming.fit.vector) / calibration
+    scores = bank.scores(naming.fit.vector)
     limits = np.array([REMAINDER_SCORES.get(r.kind, REMAINDER_SCORE) for r in bank.regions])
     worst = int(np.argmax(scores / limits))
     left = float(scores[worst])
@@ -313,8 +311,7 @@ def diagnose(
     report("locating")(0.5)
     before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
     after = strongest(whitener, bank, naming.fit.vector, naming.fit.simulated)
-    calibration = max(1.0, baseline.remainder_scale)
-    remainder = _remainder(naming, bank, calibration)
+    remainder = _remainder(naming, bank)
     detectable = smallest_detectable(searcher, whitener)
     equal = _equal(naming)
     verdict = _verdict(naming, equal, remainder, detectable)

@@ -321,7 +321,8 @@ def findings_of_vane(
     notes: list[str] = []
     middle = np.degrees(np.median(found.difference))
     block = bench.block
-    weekly = np.array([np.median(found.difference[block == b]) for b in range(bench.blocks)])
+    left = bench.residual(planted(bench.station, explained.terms), bench.everything)
+    weekly = np.array([np.median(left[block == b]) for b in range(bench.blocks)])
     spread = np.degrees(standing.spread if standing is not None else float(np.std(weekly)))
     if standing is None:
         notes.append(
