@@ -142,3 +142,12 @@ def test_calibration_and_angular_responses() -> None:
         theta, 0.05, 0.8, second_order=True
     )
     assert np.all(np.abs(difference) < 2.0 * np.abs(theta) ** 3 + 1e-15)
+
+
+def test_the_symmetric_cup_feels_the_total_speed() -> None:
+    """K94 (3): with Lambda = l, mu1 = 0 and mu2 = 1 the torque is that of the 3-D speed."""
+    even = cup.CupConstants(0.2, 1.7, second_length=0.2, mu2=1.0)
+    for u, v, w, s in ((7.0, 1.0, -0.8, 33.0), (3.0, -2.0, 1.5, 10.0)):
+        expected = (u**2 + v**2 + w**2 - (0.2 * s) ** 2) / (2.0 * 0.2 * 1.7)
+        found = float(cup.angular_acceleration(s, math.hypot(u, v), w, even))
+        assert found == pytest.approx(expected, rel=1e-12)
