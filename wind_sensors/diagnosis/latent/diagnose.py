@@ -179,8 +179,16 @@ def _placebo(felt: Felt, bench: Bench, term: Term) -> FloatArray | None:
     """What the same effect gains with the platform's velocity of another time."""
     if term.effect.name not in {"platform_velocity", "platform_velocity_scale"}:
         return None
-    shift = len(felt) // 3
-    moved = replace(felt.motion, velocity=np.roll(felt.motion.velocity, shift, axis=0))
+    platform = bench.station.platform
+    assert platform is not None
+    # The velocity of another time as it would have been in the earth's axes.
+    turn = np.ones(len(felt), dtype=np.complex128)
+    if platform.velocity_axes == "platform":
+        turn = np.exp(1j * heading_of(felt.motion))
+    plane = (felt.motion.velocity[:, 0] + 1j * felt.motion.velocity[:, 1]) * turn
+    plane = np.roll(plane, len(felt) // 3) / turn
+    velocity = np.column_stack((plane.real, plane.imag, felt.motion.velocity[:, 2]))
+    moved = replace(felt.motion, velocity=velocity)
     other = bench_of(replace(felt, motion=moved), bench.station)
     other = replace(other, noise=bench.noise)
     cost, _ = held_out(other, [(), ()], (term,))
@@ -280,7 +288,12 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
             f"{name.replace('_', ' ')}: the best fit is {values}; on held-out blocks it changes "
             f"the misfit by {-share:+.1f} % (t = {t:.1f}), which is no ground for a correction."
         )
-    lines += [text for pair, text in NOT_SEPARABLE.items() if not given & set(pair)]
+    platform = station.platform
+    for pair, text in NOT_SEPARABLE.items():
+        # A velocity in the platform's own axes turns with the compass: then only the vane is seen.
+        turns_along = platform is not None and platform.velocity_axes == "platform"
+        if not given & set(pair) and not ("heading_deviation" in pair and turns_along):
+            lines.append(text)
     return tuple(lines)
 
 

@@ -1,0 +1,339 @@
+"""Instruments of a mast against each other, where only means were recorded."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import itertools
+from datetime import datetime, timezone
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from wind_sensors.diagnosis.counts import compare_pair, count_statistics
+from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.means.averages import indicated_speed
+from wind_sensors.diagnosis.means.diagnose import diagnose_means, learn_means
+from wind_sensors.diagnosis.means.mean_response import mean_speed
+from wind_sensors.errors import UserError
+from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
+from wind_sensors.station.model import Cup, Station, Vane
+from wind_sensors.station.parameters import rotor_parameters
+from wind_sensors.station.signals import Angles, Pulses, Recording, Series
+
+FloatArray = npt.NDArray[np.float64]
+
+MAST = Path(__file__).parents[2] / "shared" / "real" / "mast_10min" / "mast.csv.gz"
+LENGTH = 0.24351
+ROWS = 4000
+PAIRS = (("one_a", "one_b"), ("two_a", "two_b"))
+CUPS = tuple(itertools.chain(*PAIRS))
+
+
+def station_of(cups: tuple[str, ...], vanes: tuple[str, ...]) -> Station:
+    made = [
+        {
+            "name": name, "kind": "cup", "pulses_per_revolution": 2,
+            "pulses": {"topic": f"/{name}", "type": "std_msgs/msg/Float64", "meaning": "value"},
+            "calibration_distance": LENGTH, "starting_speed": 0.3, "distance_constant": 3.0,
+        }
+        for name in cups
+    ]  # fmt: skip
+    turning = [
+        {
+            "name": name, "kind": "vane", "distance_constant": 1.3, "damping_ratio": 0.3,
+            "joint_states": {"topic": f"/{name}"},
+        }
+        for name in vanes
+    ]  # fmt: skip
+    return Station.model_validate(
+        {
+            "recording": {"averaging_time": 600.0, "measuring_height": 60.0},
+            "instruments": made + turning,
+        }
+    )
+
+
+def recording_of(
+    station: Station, time: npt.NDArray[np.int64], speed: dict[str, FloatArray],
+    heading: dict[str, FloatArray], temperature: FloatArray | None = None,
+) -> Recording:  # fmt: skip
+    seconds = np.diff(time) * 1e-9
+    pulses = {}
+    for name, values in speed.items():
+        rate = np.maximum(values[1:] - 0.3, 0.0) / (2.0 * np.pi * LENGTH)
+        pulses[name] = Pulses(time, np.concatenate([[0.0], np.cumsum(rate * seconds)]))
+    return Recording(
+        name="mast", station=station, start=int(time[0]), stop=int(time[-1]), pulses=pulses,
+        angles={name: Angles(time, values) for name, values in heading.items()},
+        temperature=None if temperature is None else Series(time, temperature),
+    )  # fmt: skip
+
+
+def weather(seed: int, rows: int = ROWS) -> dict[str, FloatArray]:
+    """Wind, direction, shear and gusts of a made-up month; nothing of the package is in it."""
+    rng = np.random.default_rng(seed)
+
+    def slow(hours: float) -> FloatArray:
+        memory = np.exp(-1.0 / (6.0 * hours))
+        out = np.empty(rows)
+        out[0] = rng.standard_normal()
+        for i in range(1, rows):
+            out[i] = memory * out[i - 1] + np.sqrt(1.0 - memory**2) * rng.standard_normal()
+        return out
+
+    wind = 7.5 * np.exp(0.4 * slow(18.0))
+    out = {"wind": wind, "heading": np.cumsum(0.06 * rng.standard_normal(rows)) + slow(10.0)}
+    shear = 0.04 + 0.012 * slow(6.0)
+    for k, name in enumerate(CUPS):
+        level = wind * (1.0 + shear * (k < 2))
+        noise = 0.006 * wind * (0.6 * slow(1.0) + 0.8 * rng.standard_normal(rows))
+        out[name] = level + noise
+    for name in ("vane_a", "vane_b", "vane_c"):
+        out[name] = out["heading"] + np.radians(0.6) * slow(12.0)
+    return out
+
+
+def made(
+    seed: int, rows: int = ROWS
+) -> tuple[Station, npt.NDArray[np.int64], dict[str, FloatArray]]:
+    station = station_of(CUPS, ("vane_a", "vane_b", "vane_c"))
+    time = np.arange(rows, dtype=np.int64) * 600_000_000_000
+    return station, time, weather(seed, rows)
+
+
+def recorded(
+    station: Station, time: npt.NDArray[np.int64], values: dict[str, FloatArray]
+) -> Recording:
+    return recording_of(
+        station, time, {name: values[name] for name in CUPS},
+        {name: values[name] for name in ("vane_a", "vane_b", "vane_c")},
+    )  # fmt: skip
+
+
+def names(recording: Recording, healthy: Recording | None = None) -> list[tuple[str, str, int]]:
+    normal = None if healthy is None else learn_means([(healthy, {})])
+    outcome = diagnose_means(recording, {}, normal)
+    return [(f.term.effect.name, f.term.instrument, f.set_number) for f in outcome.findings]
+
+
+def test_steady_means_agree_with_the_integrated_equation_of_motion() -> None:
+    cup = station_of(("cup",), ()).instrument("cup")
+    assert isinstance(cup, Cup)
+    for keys in (
+        {"friction_speed": 1.5}, {"calibration_gain": 0.95}, {"calibration_offset": -0.2},
+        {"friction_speed": 1.0, "a4": 0.7}, {"friction_speed": 1.0, "a4": 1.4},
+    ):  # fmt: skip
+        changed = cup.model_copy(update=keys)
+        station = station_of(("cup",), ()).model_copy(update={"instruments": (changed,)})
+        for wind in (2.0, 4.0, 9.0):
+            n = 400
+            ones = np.ones(n)
+            y, _ = integrate_rotor(
+                rotor_parameters(changed), 0.0 * ones, wind * ones, 0.0 * ones, ones, 15.0 * ones,
+                0.25, 1, wind, 0.0,
+            )  # fmt: skip
+            one = np.ones(1)
+            shown = mean_speed(
+                station, "cup", wind * one, 0.0 * one, 0.0 * one, 15.0 * one,
+                1.225 * one, 0.0 * one,
+            )  # fmt: skip
+            assert shown[0] == pytest.approx(y[-1] + 0.3, abs=2e-3)
+
+
+def test_indicated_speeds_come_back_from_turns() -> None:
+    station, time, values = made(3, 300)
+    cup = station.instrument("one_a")
+    assert isinstance(cup, Cup)
+    recording = recorded(station, time, values)
+    _, speed = indicated_speed(cup, recording.pulses["one_a"])
+    assert speed == pytest.approx(values["one_a"][1:], rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_nothing_is_named_on_healthy_means(seed: int) -> None:
+    station, time, values = made(seed)
+    _, _, before = made(seed + 100)
+    assert names(recorded(station, time, values)) == []
+    assert names(recorded(station, time, values), recorded(station, time, before)) == []
+
+
+def test_a_tower_wake_is_found_at_its_bearing() -> None:
+    station, time, values = made(11)
+    away = (np.degrees(values["heading"]) - 40.0 + 180.0) % 360.0 - 180.0
+    # A wake with straight sides, not the catalogue's Gaussian.
+    values["one_b"] = values["one_b"] * (1.0 - 0.2 * np.clip(1.0 - np.abs(away) / 22.0, 0.0, 1.0))
+    outcome = diagnose_means(recorded(station, time, values), {})
+    found = {f.term.effect.name: f for f in outcome.findings if f.set_number == 0}
+    assert set(found) == {"wake_shadow"}
+    wake = found["wake_shadow"]
+    assert wake.term.instrument == "one_b"
+    assert wake.term.values["bearing_from"] % 360.0 == pytest.approx(40.0, abs=2.0)
+    assert wake.term.values["depth"] == pytest.approx(0.19, abs=0.03)
+    assert wake.proof is not None
+    assert wake.proof.excess_removed > 0.8
+
+
+def test_other_heights_say_which_of_two_cups_has_changed() -> None:
+    station, time, values = made(12)
+    _, _, before = made(112)
+    values["one_b"] = values["one_b"] * 0.95
+    found = names(recorded(station, time, values), recorded(station, time, before))
+    assert ("calibration_drift", "one_b", 0) in found
+    assert not any(name == "one_a" for _, name, _ in found)
+
+
+def test_without_anything_else_a_gain_is_not_blamed_on_one_of_two_cups() -> None:
+    station, time, values = made(12)
+    values["one_b"] = values["one_b"] * 0.95
+    found = names(recorded(station, time, values))
+    gains = {(name, number) for effect, name, number in found if effect == "calibration_drift"}
+    assert gains == {("one_a", 1), ("one_b", 1)}
+
+
+def test_friction_is_told_from_gain_and_offset() -> None:
+    station, time, values = made(13)
+    _, _, before = made(113)
+    values["two_a"] = np.maximum(values["two_a"] - 2.5 / values["two_a"], 0.0)
+    found = names(recorded(station, time, values), recorded(station, time, before))
+    assert ("bearing_friction", "two_a", 0) in found
+
+
+def test_a_turned_vane_is_told_from_two_that_are_not() -> None:
+    station, time, values = made(14)
+    _, _, before = made(114)
+    values["vane_b"] = values["vane_b"] + np.radians(7.0)
+    normal = learn_means([(recorded(station, time, before), {})])
+    outcome = diagnose_means(recorded(station, time, values), {}, normal)
+    (finding,) = outcome.findings
+    assert (finding.term.effect.name, finding.term.instrument) == ("vane_offset", "vane_b")
+    estimate = finding.parameters["offset"]
+    assert estimate.value == pytest.approx(7.0, abs=0.5)
+    corrected = outcome.station.instrument("vane_b")
+    assert isinstance(corrected, Vane)
+    assert corrected.offset_deg == pytest.approx(estimate.value)
+
+
+def test_a_constant_turn_without_healthy_means_is_declined_but_a_step_is_not() -> None:
+    station, time, values = made(15)
+    constant = {**values, "vane_b": values["vane_b"] + np.radians(7.0)}
+    outcome = diagnose_means(recorded(station, time, constant), {})
+    assert not outcome.findings
+    assert any(line.startswith("vane_b") for line in outcome.declined)
+    late = np.arange(ROWS) > ROWS // 2
+    step = {**values, "vane_b": values["vane_b"] + np.radians(9.0) * late}
+    outcome = diagnose_means(recorded(station, time, step), {})
+    (finding,) = outcome.findings
+    assert finding.term.instrument == "vane_b"
+    assert finding.term.interval != ALWAYS
+    assert abs(finding.term.values["offset"]) == pytest.approx(9.0, abs=1.0)
+
+
+def test_a_sensor_that_stands_in_the_wind_is_stuck_and_takes_no_part() -> None:
+    station, time, values = made(16)
+    stuck = {**values, "vane_a": values["vane_a"].copy(), "two_b": values["two_b"].copy()}
+    stuck["vane_a"][2500:] = stuck["vane_a"][2500]
+    stuck["two_b"][3000:] = 0.0
+    outcome = diagnose_means(recorded(station, time, stuck), {})
+    found = {f.term.instrument: f for f in outcome.findings}
+    assert set(found) == {"vane_a", "two_b"}
+    assert all(f.term.effect.name == "stuck_sensor" for f in found.values())
+    assert found["vane_a"].term.values["start"] == pytest.approx(2500 * 600.0, abs=1300.0)
+    assert found["two_b"].term.values["start"] == pytest.approx(3000 * 600.0, abs=1300.0)
+
+
+def test_ice_is_told_from_a_cup_that_is_slow_in_warm_air_too() -> None:
+    station, time, values = made(17)
+    temperature = 6.0 + 7.0 * np.sin(np.arange(ROWS) / 300.0)
+    frozen = values["one_b"].copy()
+    warm = values["one_b"].copy()
+    rng = np.random.default_rng(5)
+    for row in rng.choice(np.flatnonzero((temperature < 0.0) & (values["wind"] > 4.0)), 9):
+        frozen[row : row + 8] *= 0.4
+    for row in rng.choice(np.flatnonzero(values["wind"] > 4.0), 9):
+        warm[row : row + 8] *= 0.4
+    headings = {name: values[name] for name in ("vane_a", "vane_b", "vane_c")}
+    for changed, expected in ((frozen, True), (warm, False)):
+        speeds = {name: values[name] for name in CUPS} | {"one_b": changed}
+        recording = recording_of(station, time, speeds, headings, temperature)
+        assert (("icing", "one_b", 0) in names(recording)) is expected
+
+
+def test_too_few_means_are_refused_in_words() -> None:
+    station, time, values = made(1, 100)
+    with pytest.raises(UserError, match="too few"):
+        diagnose_means(recorded(station, time, values), {})
+
+
+def counted(rates: FloatArray, keep: int = 1) -> Recording:
+    """Counts of a rotor read every second; with `keep` 2 the counter sees only pairs of pulses."""
+    station = Station.model_validate(
+        {
+            "instruments": [
+                {
+                    "name": name, "kind": "cup", "pulses_per_revolution": 4,
+                    "pulses": {"topic": f"/{name}", "type": "std_msgs/msg/Int64"},
+                    "calibration_distance": 0.2, "starting_speed": 0.2, "distance_constant": 2.0,
+                }
+                for name in ("a", "b")
+            ]
+        }
+    )  # fmt: skip
+    time = np.arange(rates.size + 1, dtype=np.int64) * 1_000_000_000
+    total = np.floor(np.concatenate([[0.0], np.cumsum(rates)]) / keep) * keep
+    pulses = Pulses(time, total / 4.0)
+    return Recording("roof", station, 0, int(time[-1]), {"a": pulses, "b": pulses})
+
+
+def test_whole_numbers_explain_the_scatter_of_a_steady_rotor() -> None:
+    rng = np.random.default_rng(2)
+    rates = 11.37 + 0.02 * rng.standard_normal(3000)
+    found = count_statistics(counted(rates), "a")
+    assert found.deviation == pytest.approx(np.sqrt(0.37 * 0.63), abs=0.02)
+    assert found.rapid < 0.25 * found.quantisation
+    assert found.quantisation == pytest.approx(found.pulse_speed / np.sqrt(6.0))
+
+
+def test_a_counter_that_sees_every_second_pulse_shows_even_numbers_only() -> None:
+    rng = np.random.default_rng(3)
+    rates = np.clip(12.0 + 4.0 * rng.standard_normal(3000), 2.0, None)
+    assert count_statistics(counted(rates), "a").even_p > 1e-3
+    halved = count_statistics(counted(rates, keep=2), "a")
+    assert halved.even == 1.0
+    assert halved.even_p < 1e-12
+    assert halved.missing
+
+
+def test_two_equal_counters_do_not_differ() -> None:
+    rng = np.random.default_rng(4)
+    found = compare_pair(counted(np.clip(9.0 + 3.0 * rng.standard_normal(2400), 0, None)), "a", "b")
+    assert found.difference == 0.0
+
+
+def mast_rows(count: int) -> tuple[npt.NDArray[np.int64], dict[str, FloatArray]]:
+    with gzip.open(MAST, "rt", encoding="utf-8-sig", newline="") as file:
+        rows = list(itertools.islice(csv.DictReader(file), count))
+    stamps = [datetime.fromisoformat(r["Timestamp"]).replace(tzinfo=timezone.utc) for r in rows]
+    time = np.array([int(s.timestamp()) for s in stamps], dtype=np.int64) * 1_000_000_000
+    columns = ("Spd60mN", "Spd60mS", "Spd40mN", "Spd40mS", "Dir58mS", "Dir38mS", "Dir78mS")
+    return time, {c: np.array([float(r[c]) for r in rows]) for c in columns}
+
+
+@pytest.mark.skipif(not MAST.exists(), reason="shared material absent")
+def test_on_the_real_mast_a_planted_gain_is_named_and_the_mast_as_it_is_gets_no_name() -> None:
+    time, columns = mast_rows(13_000)
+    cups = ("Spd60mN", "Spd60mS", "Spd40mN", "Spd40mS")
+    vanes = ("Dir58mS", "Dir38mS", "Dir78mS")
+    station = station_of(cups, vanes)
+
+    def part(first: int, last: int, factor: float) -> Recording:
+        rows = slice(first, last)
+        speeds = {c: columns[c][rows] * (factor if c == "Spd40mS" else 1.0) for c in cups}
+        headings = {v: np.radians(90.0 - columns[v][rows]) for v in vanes}
+        return recording_of(station, time[rows], speeds, headings)
+
+    healthy = part(0, 6500, 1.0)
+    assert names(part(6500, 13_000, 1.0), healthy) == []
+    assert names(part(6500, 13_000, 1.04), healthy)[0][:2] == ("calibration_drift", "Spd40mS")
