@@ -49,7 +49,7 @@ def test_a_flight_tells_the_inflow_of_its_rotors() -> None:
     assert finding.term.key == ("rotor_downwash", "platform")
     for key, planted in (("induced_velocity", 2.0), ("wake_skew", 0.3)):
         estimate = finding.parameters[key]
-        assert estimate.value == pytest.approx(planted, rel=0.15)
+        assert estimate.value == pytest.approx(planted, rel=0.2)
         assert estimate.low < planted < estimate.high
     assert finding.proof is not None
     assert finding.proof.excess_removed > 0.8
