@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
+from wind_sensors.diagnosis.comparison import BANDS, LOW_END, Comparison, Simulated
 from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.diagnosis.whitening import Whitener
 
@@ -171,6 +171,8 @@ def _frequency_regions(
     groups = edges[2::2]
     for a, b in itertools.pairwise(groups):
         low, high = float(a * per), float(b * per)
+        if low < LOW_END:
+            continue
         label = f"{low:.3g} to {high:.3g} Hz"
         yield (
             Region(channel.name, "frequency", low, high, label),
