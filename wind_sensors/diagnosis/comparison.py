@@ -31,7 +31,7 @@ from wind_sensors.diagnosis.observation import (
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import Drive, drive_from_recording
 from wind_sensors.simulation.encoder import angle_readings
-from wind_sensors.simulation.pulses import edge_times
+from wind_sensors.simulation.pulses import rotor_signals
 from wind_sensors.simulation.response import Response, respond
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.model import Propeller, Rotor, Station
@@ -168,7 +168,7 @@ class Comparison:
                 turned = response.rotors[name].psi[-1]
                 if not np.isfinite(turned) or abs(turned) > FASTEST * self.drive.wind.shape[0]:
                     raise ValueError(f"'{name}' runs away")
-                pulses[name] = Pulses(edge_times(response, name))
+                pulses[name] = rotor_signals(response, name)
             else:
                 time = self.recording.angles[name].time
                 angles[name] = Angles(time, angle_readings(response, name, time))

@@ -2,7 +2,7 @@
 
 from wind_sensors.simulation.drive import Drive, air_density, drive_from_recording
 from wind_sensors.simulation.encoder import AngleEncoder, angle_readings
-from wind_sensors.simulation.pulses import PulseCircuit, edge_times
+from wind_sensors.simulation.pulses import PulseCircuit, edge_times, rotor_signals
 from wind_sensors.simulation.response import (
     AngleResponse,
     Response,
@@ -32,5 +32,6 @@ __all__ = [
     "drive_from_recording",
     "edge_times",
     "respond",
+    "rotor_signals",
     "simulate",
 ]

@@ -238,6 +238,13 @@ def edge_times(response: Response, name: str, seed: int = 0) -> TimeArray:
     Returns:
         [ns], in order of the edges' true times.
     """
-    drive = response.drive
-    origin = drive.start_ns - round(drive.elapsed * 1e9)
-    return PulseCircuit(name, origin, seed).edges(response)
+    return PulseCircuit(name, _origin(response), seed).edges(response)
+
+
+def rotor_signals(response: Response, name: str, seed: int = 0) -> Pulses:
+    """`PulseCircuit.signals` of one rotor in a response that begins a recording's interval."""
+    return PulseCircuit(name, _origin(response), seed).signals(response)
+
+
+def _origin(response: Response) -> int:
+    return response.drive.start_ns - round(response.drive.elapsed * 1e9)
