@@ -124,14 +124,16 @@ def count_statistics(recording: Recording, rotor: str) -> CountStatistics:
     odd = inner % 2 == 1
     expected = smooth[inner]
     even_p = 1.0
-    if inner.size >= 6 and expected.sum() > 0:
+    if inner.size >= 6 and histogram[inner].sum() >= _FEWEST:
         share = float(expected[~odd].sum() / expected.sum())
         observed = int(histogram[inner][~odd].sum())
         even_p = float(
             stats.binomtest(observed, int(histogram[inner].sum()), min(share, 1.0)).pvalue
         )
     missing = tuple(
-        int(k) for k in inner if histogram[k] == 0 and smooth[k] * 2.0 > _COMMON
+        int(k)
+        for k in inner
+        if histogram[k] == 0 and min(histogram[k - 1], histogram[k + 1]) > _COMMON
     )
     return CountStatistics(
         seconds=int(counts.size),

@@ -33,7 +33,7 @@ PLATFORM_VELOCITY = Effect(
     region="with the carrier's speed and heading",
     parameters=(
         Parameter(
-            "velocity_share", "1", -1.0, 0.999, healthy=1.0, minimum=0.15, starts=(0.0,), step=0.02
+            "velocity_share", "1", -1.0, 2.0, healthy=1.0, minimum=0.15, starts=(0.0,), step=0.02
         ),
     ),
     applies=_is_platform,
