@@ -287,13 +287,13 @@ def counted(rates: FloatArray, keep: int = 1) -> Recording:
     return Recording("roof", station, 0, int(time[-1]), {"a": pulses, "b": pulses})
 
 
-def test_whole_numbers_explain_the_scatter_of_a_steady_rotor() -> None:
+def test_what_counting_adds_to_the_scatter_is_told_from_the_wind() -> None:
     rng = np.random.default_rng(2)
-    rates = 11.37 + 0.02 * rng.standard_normal(3000)
-    found = count_statistics(counted(rates), "a")
-    assert found.deviation == pytest.approx(np.sqrt(0.37 * 0.63), abs=0.02)
-    assert found.rapid < 0.25 * found.quantisation
+    found = count_statistics(counted(11.4 + 0.6 * rng.standard_normal(20_000)), "a")
     assert found.quantisation == pytest.approx(found.pulse_speed / np.sqrt(6.0))
+    assert found.deviation**2 == pytest.approx(0.6**2 + 1.0 / 6.0, rel=0.03)
+    assert found.rapid == pytest.approx(0.6 * found.pulse_speed, rel=0.05)
+    assert not found.missing
 
 
 def test_a_counter_that_sees_every_second_pulse_shows_even_numbers_only() -> None:
