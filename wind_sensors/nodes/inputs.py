@@ -10,9 +10,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.diagnostics import Level, Status
@@ -28,9 +29,6 @@ from wind_sensors.station.inputs import (
     scaled,
 )
 from wind_sensors.station.model import Cup, Input, Propeller, Station
-
-if TYPE_CHECKING:
-    from wind_sensors.estimation.streaming import StreamingEstimator
 
 Handler = Callable[[Any, int], None]
 
@@ -85,6 +83,31 @@ def nanoseconds(stamp: Any) -> int:
     return int(stamp.sec) * _SECOND + int(stamp.nanosec)
 
 
+class SignalTaker(Protocol):
+    """What takes a station's signals: an estimator, or a watch."""
+
+    def add_pulse(self, name: str, time_ns: int, turns: float | None = None) -> None:
+        """An edge of a rotor."""
+
+    def add_angle(self, name: str, time_ns: int, angle: float) -> None:
+        """A reading of a vane."""
+
+    def add_platform(
+        self,
+        time_ns: int,
+        attitude_xyzw: npt.ArrayLike,
+        velocity: npt.ArrayLike,
+        angular_rate: npt.ArrayLike,
+        position: npt.ArrayLike,
+    ) -> None:
+        """State of the carrier."""
+
+    def add_air(
+        self, time_ns: int, temperature: float | None = None, pressure: float | None = None
+    ) -> None:
+        """Air temperature, pressure, or both."""
+
+
 class EstimatorInputs:
     """Subscriptions of one station and the way from their messages to an estimator.
 
@@ -101,7 +124,7 @@ class EstimatorInputs:
     """
 
     def __init__(
-        self, station: Station, estimator: StreamingEstimator, now: Callable[[], int]
+        self, station: Station, estimator: SignalTaker, now: Callable[[], int]
     ) -> None:
         self.estimator = estimator
         self.counts: dict[str, TopicCount] = defaultdict(TopicCount)
