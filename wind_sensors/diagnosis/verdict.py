@@ -50,7 +50,7 @@ raise the power of a band on healthy days, too."""
 REMAINDER_SCORE = 30.0
 """The same for the other kinds."""
 
-REMAINDER_SHARE = 0.25
+REMAINDER_SHARE = 0.06
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
 REMAINDER_P = 0.05
@@ -207,6 +207,11 @@ def _patchwork(naming: Naming) -> bool:
     return len(passing) != len(set(passing))
 
 
+def _structured(found: list[Found]) -> list[Found]:
+    """Regions of time, speed and direction before those of spectra and statistics."""
+    return sorted(found, key=lambda f: f.region.kind in {"frequency", "spectrum", "statistic"})
+
+
 def _description(found: Found) -> str:
     channel = found.region.channel
     if found.region.kind in {"spectrum", "statistic", "frequency"}:
@@ -322,7 +327,11 @@ def diagnose(
     report("proving")(1.0)
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     station = planted(baseline.station, named)
-    description = _description(after[0]) if remainder[1] < REMAINDER_P else ""
+    if verdict == "unknown":
+        after = _structured(before)
+    description = ""
+    if verdict == "unknown" or remainder[1] < REMAINDER_P:
+        description = _description(after[0])
     return Diagnosis(
         recording=recording.name,
         verdict=verdict,

@@ -185,7 +185,9 @@ def diagnose_means(
         if left.share > worst.share:
             worst = left
         terms += blamed
-        shown += panels.of_pair(pair, recording.station, explained.terms)
+        shown += panels.of_pair(
+            pair, recording.station, planted(recording.station, explained.terms)
+        )
         report(phase, 1.0)
     for vane in averages.heading:
         turned = healthy.vanes.get(vane) if healthy is not None else None
@@ -205,7 +207,8 @@ def diagnose_means(
         findings += own
         declined += notes
         terms += [f.term for f in own]
-        shown.append(panels.of_vane(found, recording.station, explained.terms))
+        after = planted(recording.station, explained.terms)
+        shown.append(panels.of_vane(found, recording.station, after))
     findings, terms = _one_vane(findings, terms, declined)
     station = planted(recording.station, [t for t in terms if t.interval == ALWAYS])
     station = planted(station, [t for t in terms if t.interval != ALWAYS])

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.fitting import Term, planted
 from wind_sensors.diagnosis.means.pair import Pair
 from wind_sensors.diagnosis.means.vanes import VaneBench
 from wind_sensors.diagnosis.outcome import Panel
@@ -43,9 +41,13 @@ def _panel(
     return Panel(title, axis, at[:, 0], at[:, 1], at[:, 2], at[:, 3], unit)
 
 
-def of_pair(pair: Pair, station: Station, terms: Sequence[Term]) -> list[Panel]:
-    """Residual of a pair over direction, speed and time, relative to the wind."""
-    explained = planted(station, terms)
+def of_pair(pair: Pair, station: Station, explained: Station) -> list[Panel]:
+    """Residual of a pair over direction, speed and time, relative to the wind.
+
+    Args:
+        pair: The pair.
+        station, explained: Before and after.
+    """
     speed = pair.wind(explained)
     before = 100.0 * pair.residual(station) / speed
     after = 100.0 * pair.residual(explained) / speed
@@ -63,12 +65,12 @@ def of_pair(pair: Pair, station: Station, terms: Sequence[Term]) -> list[Panel]:
     ]  # fmt: skip
 
 
-def of_vane(found: VaneBench, station: Station, terms: Sequence[Term]) -> Panel:
+def of_vane(found: VaneBench, station: Station, explained: Station) -> Panel:
     """Difference of a vane from the others over time."""
     bench = found.bench
     everything = bench.everything
     before = np.degrees(bench.residual(station, everything))
-    after = np.degrees(bench.residual(planted(station, terms), everything))
+    after = np.degrees(bench.residual(explained, everything))
     day = bench.elapsed / _DAY
     edges = np.linspace(day[0], day[-1] + 1e-6, 60)
     return _panel(f"{found.vane} - other vanes", "day", "deg", day, edges, before, after)
