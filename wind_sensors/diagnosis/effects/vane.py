@@ -27,6 +27,7 @@ VANE_FRICTION = Effect(
     equation="phi'' = ... - (h_f/l_v)^2 sgn(phi'); at rest while h^2 |sin(phi - alpha)| < h_f^2",
     source="K94, eq. (36), with dry friction",
     region="low speeds, small deviations",
+    smooths=True,
     parameters=(
         Parameter(
             "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 2.0)
