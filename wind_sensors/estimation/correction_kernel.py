@@ -22,6 +22,8 @@ _CALM = 0.3
 _AMBIGUOUS = 0.35
 """Uncertainty of the turned angle [slots] from which an edge no longer tells how many slots have
 passed."""
+_LEAST_PART = 0.2
+"""[slots]"""
 _RARE = 7.0
 """Log of the odds against a lost or an extra edge before any was seen."""
 _FAR_OUT = 5.0
@@ -220,6 +222,12 @@ def correct_by_turns(f: FilterState, ring: Ring, slot: int, r: int, angle: float
             f.tally[r, 3] += 1
         return
     f.rejected[r] = 0
+    if f.tally[r, 0] > 1:
+        step = abs(angle - f.last_angle[r]) / width
+        # A step of part of a slot: the angle is sampled in time.
+        sampled = _LEAST_PART < step < 1.0 - _LEAST_PART
+        f.largest_step[r] = math.inf if sampled else max(f.largest_step[r], step)
+    f.last_angle[r] = angle
     squared = correct(f, ring, slot, measured, innovation, f.edge_variance[r] * width * width)
     ring.kind[slot] = EDGE
     ring.which[slot] = r
@@ -227,16 +235,18 @@ def correct_by_turns(f: FilterState, ring: Ring, slot: int, r: int, angle: float
 
 
 @compiled
-def correct_by_silence(f: FilterState, ring: Ring, slot: int, r: int, limit: float) -> None:
+def correct_by_silence(
+    f: FilterState, ring: Ring, slot: int, r: int, limit: float, side: float
+) -> None:
     """No edge yet: rotor r has not passed `limit` [rad]; a truncated normal distribution.
 
-    Its mean and variance are matched by an equivalent measurement, so that the smoother sees an
-    ordinary one.
+    `side` is 1 for a limit ahead of the rotor, -1 for one behind it. Mean and variance are matched
+    by an equivalent measurement, so that the smoother sees an ordinary one.
     """
     measured = WIND_STATES + 2 * r + 1
     variance = f.covariance[measured, measured]
     deviation = math.sqrt(variance)
-    z = (limit - f.mean[measured]) / deviation
+    z = side * (limit - f.mean[measured]) / deviation
     if z > 2.5:
         return
     if z > -5.0:
@@ -247,5 +257,5 @@ def correct_by_silence(f: FilterState, ring: Ring, slot: int, r: int, limit: flo
         ratio = -z - 1.0 / z
     left = min(max(1.0 - z * ratio - ratio * ratio, 1e-4), 0.999)
     noise = variance * left / (1.0 - left)
-    innovation = -deviation * ratio * (variance + noise) / variance
+    innovation = -side * deviation * ratio * (variance + noise) / variance
     correct(f, ring, slot, measured, innovation, noise)

@@ -47,6 +47,8 @@ class FilterState(NamedTuple):
         last_used: Time of the last edge that corrected the filter [ns].
         slot_interval: Time per slot before that edge, lost edges counted [s]; 0 before the first.
         edge_count: Edges since the start, lost ones included.
+        last_angle: Angle last told by each rotor with a counter or encoder [rad].
+        largest_step: Largest step of that angle from message to message [slots].
         rejected: Consecutive rejections of each rotor.
         tally: By rotor: accepted, lost, extra, wind found again; shape (rotors, 4).
         innovation: Running sum of squared normalised innovations and their number (rotors, then
@@ -73,6 +75,8 @@ class FilterState(NamedTuple):
     last_used: IntArray
     slot_interval: FloatArray
     edge_count: IntArray
+    last_angle: FloatArray
+    largest_step: FloatArray
     rejected: IntArray
     tally: IntArray
     innovation: FloatArray
@@ -143,6 +147,8 @@ def empty_filter(rotors: int, vanes: int) -> FilterState:
         last_used=np.zeros(rotors, dtype=np.int64),
         slot_interval=np.zeros(rotors),
         edge_count=np.zeros(rotors, dtype=np.int64),
+        last_angle=np.zeros(rotors),
+        largest_step=np.zeros(rotors),
         rejected=np.zeros(rotors, dtype=np.int64),
         tally=np.zeros((rotors, 4), dtype=np.int64),
         innovation=np.zeros((rotors + vanes, 2)),

@@ -25,6 +25,10 @@ IntArray = npt.NDArray[np.int64]
 
 _STOPPABLE = 16.0
 """A rotor whose y^2 is less than this times its friction may stop at once [1]."""
+_SLOT_BY_SLOT = 1.2
+"""Largest step of a shaft angle [slots] that is told whenever it passes a slot."""
+_SLOT_BY_SLOT_AFTER = 10
+"""Messages until that is believed."""
 _LOSS_NOTICED = 0.002
 """Share of lost edges from which silence no longer means that the rotor waits."""
 _TOO_EARLY = 0.4
@@ -175,16 +179,30 @@ def _must_have_turned(f: FilterState, s: Instruments, r: int) -> float:
 
 
 @compiled
+def _listen_to_encoder(f: FilterState, ring: Ring, at: int, r: int) -> None:
+    """A shaft angle that is told slot by slot has not left its slot, one way or the other."""
+    if f.tally[r, 0] < _SLOT_BY_SLOT_AFTER or f.largest_step[r] > _SLOT_BY_SLOT:
+        return
+    measured = WIND_STATES + 2 * r + 1
+    width = 2.0 * math.pi / f.slots[r]
+    side = 1.0 if f.mean[measured] > f.last_angle[r] else -1.0
+    correct_by_silence(f, ring, at, r, f.last_angle[r] + 1.2 * side * width, side)
+
+
+@compiled
 def _listen(f: FilterState, s: Instruments, ring: Ring, at: int, rotors: int, which: int) -> None:
     """No edge until now: at output instants one rotor in turn may not have passed its next edge."""
     if rotors == 0:
         return
     r = which % rotors
-    if f.tally[r, 0] == 0 or f.stride[r] == 0:
+    if f.tally[r, 0] == 0:
+        return
+    if f.stride[r] == 0:
+        _listen_to_encoder(f, ring, at, r)
         return
     lost = f.tally[r, 1] / max(f.tally[r, 0], 1)
     allowance = 1.2 if lost < _LOSS_NOTICED else 4.0
     width = 2.0 * math.pi / f.slots[r]
     if _must_have_turned(f, s, r) > (allowance + 1.0) * width:
         return
-    correct_by_silence(f, ring, at, r, (f.edge_count[r] + allowance) * width)
+    correct_by_silence(f, ring, at, r, (f.edge_count[r] + allowance) * width, 1.0)
