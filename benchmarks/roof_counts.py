@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from itertools import combinations
 
 from rich.console import Console
@@ -29,7 +30,8 @@ def main() -> None:
         table.add_row(
             rotor.name, str(s.seconds), f"{s.mean:.2f} +- {s.deviation:.2f}",
             f"{100.0 * s.still:.1f} %", f"{s.pulse_speed:.3f}", f"{s.quantisation:.3f}",
-            f"{s.rapid:.3f}", f"{100.0 * s.even:.1f} %", f"{s.even_p:.2g}",
+            f"{s.rapid:.3f}", f"{100.0 * s.even:.1f} %",
+            f"{s.even_p:.2g}" if math.isfinite(s.even_p) else "too few counts",
             ", ".join(map(str, s.missing)) or "none",
         )  # fmt: skip
     console.print(table)

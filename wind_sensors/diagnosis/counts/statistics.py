@@ -40,7 +40,8 @@ class CountStatistics(NamedTuple):
         rapid: Standard deviation of the indicated speed between neighbouring intervals, beyond
             counting [m/s]; 0 where counting explains all of it.
         even: Share of even counts.
-        even_p: Probability of a parity so uneven, given the distribution's smooth neighbours.
+        even_p: Probability of a parity so uneven, given the distribution's smooth neighbours; NaN
+            where too few different counts occur.
         missing: Counts that should have occurred often and never did.
     """
 
@@ -123,7 +124,7 @@ def count_statistics(recording: Recording, rotor: str) -> CountStatistics:
     inner = np.arange(2, size - 2)
     odd = inner % 2 == 1
     expected = smooth[inner]
-    even_p = 1.0
+    even_p = float("nan")
     if inner.size >= 6 and histogram[inner].sum() >= _FEWEST:
         share = float(expected[~odd].sum() / expected.sum())
         observed = int(histogram[inner][~odd].sum())

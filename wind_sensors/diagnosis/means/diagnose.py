@@ -21,9 +21,9 @@ from wind_sensors.diagnosis.means.findings import (
     findings_of_vane,
 )
 from wind_sensors.diagnosis.means.pair import (
-    Standing,
     cells,
     direction_of,
+    is_comparable,
     pair_of,
     pairs_of,
     standing_of,
@@ -32,7 +32,6 @@ from wind_sensors.diagnosis.means.pair import (
 from wind_sensors.diagnosis.means.pair_effects import rotor_effects
 from wind_sensors.diagnosis.means.search import Named, bench_of, intervals, is_normal, search
 from wind_sensors.diagnosis.means.vanes import (
-    VaneStanding,
     vane_bench,
     vane_effects,
     vane_standing,
@@ -44,6 +43,9 @@ from wind_sensors.station.signals import Recording, Series
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, float], None]
+
+WORKING = 0.5
+"""Share of its means that a vane must deliver to be compared with healthy ones."""
 
 DECISIVE = 3.0
 """The other heights decide between two rotors when the log-likelihoods differ by so much."""
@@ -62,14 +64,12 @@ class Healthy:
     Attributes:
         names: Of the recordings.
         averages: Their means, without silences.
-        pairs: By pair.
-        vanes: By vane.
+        pairs: Rotors that are each other's reference.
     """
 
     names: tuple[str, ...]
     averages: Averages
-    pairs: Mapping[tuple[str, str], Standing]
-    vanes: Mapping[str, VaneStanding]
+    pairs: tuple[tuple[str, str], ...]
 
 
 def is_of_means(recording: Recording) -> bool:
@@ -103,13 +103,23 @@ def learn_means(
         )
     recording, deviations = recordings[0]
     _, clean, _ = _clean(recording, deviations)
-    pairs = {pair: standing_of(clean, *pair) for pair in pairs_of(clean)}
-    vanes = {}
-    for vane in clean.heading:
-        found = vane_standing(clean, clean.station, vane)
-        if found is not None:
-            vanes[vane] = found
-    return Healthy((recording.name,), clean, pairs, vanes)
+    return Healthy((recording.name,), clean, tuple(pairs_of(clean)))
+
+
+def _same_vanes(healthy: Healthy, averages: Averages) -> tuple[Healthy, Averages]:
+    """Both with the vanes that work in both: a direction must mean the same before and after."""
+
+    def working(means: Averages) -> set[str]:
+        return {n for n, v in means.heading.items() if np.mean(np.isfinite(v)) > WORKING}
+
+    common = working(healthy.averages) & working(averages)
+    if not common:
+        return healthy, averages
+    one, two = (
+        replace(a, heading={n: v for n, v in a.heading.items() if n in common})
+        for a in (healthy.averages, averages)
+    )
+    return replace(healthy, averages=one), two
 
 
 def diagnose_means(
@@ -140,6 +150,13 @@ def diagnose_means(
     findings: list[Finding] = [finding_of_silence(averages, s) for s in silent]
     declined: list[str] = []
     pairs = pairs_of(averages) if healthy is None else list(healthy.pairs)
+    if healthy is not None:
+        healthy, averages = _same_vanes(healthy, averages)
+    for pair_names in list(pairs):
+        both = (averages,) if healthy is None else (averages, healthy.averages)
+        if not all(is_comparable(a, *pair_names) for a in both):
+            pairs.remove(pair_names)
+            declined.append(f"{' and '.join(pair_names)}: too few common means to compare them.")
     if not pairs:
         raise UserError(
             "no two rotors agree well enough to be each other's reference.",
@@ -157,7 +174,7 @@ def diagnose_means(
         phase = f"{first} and {second}"
         report(phase, 0.0)
         along = partial(report, phase)
-        standing = healthy.pairs.get((first, second)) if healthy is not None else None
+        standing = standing_of(healthy.averages, first, second) if healthy is not None else None
         pair = pair_of(averages, first, second, standing)
         bench = bench_of(pair, recording.station)
         normal = None
@@ -190,7 +207,9 @@ def diagnose_means(
         )
         report(phase, 1.0)
     for vane in averages.heading:
-        turned = healthy.vanes.get(vane) if healthy is not None else None
+        turned = None
+        if healthy is not None:
+            turned = vane_standing(healthy.averages, recording.station, vane)
         if healthy is not None and turned is None:
             continue
         found = vane_bench(averages, recording.station, vane, turned)

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.means.search import (
     Bench,
     Explained,
     Named,
+    fit,
     halves,
     huber,
     intervals,
@@ -212,7 +213,9 @@ def findings_of_pair(
                 others, proof, set_number,
             )
         )  # fmt: skip
-        for other, behind in distinct.values():
+        rest = [t for j, t in enumerate(explained.terms) if j != k]
+        for twin, behind in distinct.values():
+            (other,) = fit(bench, rest, (twin,), bench.everything)
             out.append(
                 Finding(
                     other, _estimates(other, {}), _place(work, other, before), out[-1].share, p,

@@ -8,7 +8,13 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.means.averages import Averages, BoolArray, blocks_of, part
+from wind_sensors.diagnosis.means.averages import (
+    FEWEST_ROWS,
+    Averages,
+    BoolArray,
+    blocks_of,
+    part,
+)
 from wind_sensors.diagnosis.means.mean_response import mean_speed
 from wind_sensors.station.model import Station
 
@@ -209,6 +215,12 @@ def noise_of(residual: FloatArray, speed: FloatArray) -> FloatArray:
             middles.append(float(np.median(speed[inside])))
             widths.append(1.4826 * float(np.median(np.abs(chosen - np.median(chosen)))))
     return np.maximum(np.interp(speed, middles, widths), _SMALLEST_NOISE)
+
+
+def is_comparable(averages: Averages, first: str, second: str) -> bool:
+    """Whether two rotors have enough common means in wind."""
+    one, two = averages.speed[first], averages.speed[second]
+    return int(np.count_nonzero((one > SLOWEST) & (two > SLOWEST))) >= FEWEST_ROWS
 
 
 def pair_of(averages: Averages, first: str, second: str, standing: Standing | None = None) -> Pair:
