@@ -56,6 +56,7 @@ def run(options: argparse.Namespace) -> int:
         else:
             baseline = learnt(options.healthy, options.station, recording.station, progress)
         task = progress.add_task("comparing", total=1.0)
+        baseline = baseline.for_station(recording.station)
         comparison = prepare(recording, baseline.station)
         searcher = searcher_of(
             comparison, baseline, catalogue(), {},

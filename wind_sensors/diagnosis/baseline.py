@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STILLNESS, Channel
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -63,6 +63,7 @@ class Baseline:
 
     Attributes:
         recordings: Names of the recordings; empty: none were given (null not calibrated).
+        original: The station as its file described it.
         station: The station as commissioned: its file with the standing differences that a gain,
             an offset, a mounting angle can describe.
         channels: By channel name.
@@ -72,6 +73,7 @@ class Baseline:
     """
 
     recordings: tuple[str, ...]
+    original: Station
     station: Station
     channels: Mapping[str, ChannelBaseline]
     means: Mapping[str, float] = field(default_factory=dict)
@@ -82,10 +84,33 @@ class Baseline:
         """Whether healthy recordings stand behind it."""
         return bool(self.recordings)
 
+    def for_station(self, station: Station) -> Baseline:
+        """The same baseline for a recording whose station file may say otherwise.
+
+        What commissioning found (gains, offsets, mounting angles) goes on top of that file.
+        """
+        same = (
+            station.instruments == self.original.instruments
+            and station.platform == self.original.platform
+            and station.changes == self.original.changes
+        )
+        if same:
+            return self
+        before = {entry.name: entry for entry in self.original.instruments}
+        after = {entry.name: entry for entry in self.station.instruments}
+        entries = tuple(
+            _commissioned(entry, before.get(entry.name), after.get(entry.name))
+            for entry in station.instruments
+        )
+        return replace(
+            self, original=station, station=station.model_copy(update={"instruments": entries})
+        )
+
     def to_json(self) -> str:
         """As text; arrays become lists."""
         content: dict[str, Any] = {
             "recordings": list(self.recordings),
+            "original": self.original.model_dump(mode="json"),
             "station": self.station.model_dump(mode="json"),
             "channels": {
                 name: {k: np.asarray(v).tolist() for k, v in asdict(c).items()}
@@ -107,6 +132,7 @@ class Baseline:
         try:
             return Baseline(
                 recordings=tuple(content["recordings"]),
+                original=Station.model_validate(content["original"]),
                 station=Station.model_validate(content["station"]),
                 channels={
                     name: ChannelBaseline(**{k: np.asarray(v) for k, v in c.items()})
@@ -117,6 +143,26 @@ class Baseline:
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem
+
+
+def _commissioned(
+    entry: AnyInstrument, before: AnyInstrument | None, after: AnyInstrument | None
+) -> AnyInstrument:
+    """An instrument with the differences that commissioning found on its namesake."""
+    if isinstance(entry, Rotor) and isinstance(before, Rotor) and isinstance(after, Rotor):
+        gain = after.calibration_gain / before.calibration_gain
+        return entry.model_copy(
+            update={
+                "calibration_gain": entry.calibration_gain * gain,
+                "calibration_offset": entry.calibration_offset
+                + after.calibration_offset
+                - before.calibration_offset,
+            }
+        )
+    if isinstance(entry, Angle) and isinstance(before, Angle) and isinstance(after, Angle):
+        turned = entry.offset_deg + after.offset_deg - before.offset_deg
+        return entry.model_copy(update={"offset_deg": turned})
+    return entry
 
 
 def default_channel(channel: Channel) -> ChannelBaseline:

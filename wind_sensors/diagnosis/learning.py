@@ -48,7 +48,8 @@ LARGEST_SHARED_BANK = 4
 
 def default_baseline(station: Station) -> Baseline:
     """A baseline from certificate tolerances alone: no healthy recording was given."""
-    return Baseline((), station, {c.name: default_channel(c) for c in channels_of(station)})
+    channels = {c.name: default_channel(c) for c in channels_of(station)}
+    return Baseline((), station, station, channels)
 
 
 def _exponents(comparisons: Sequence[Comparison], name: str, station: Station) -> FloatArray:

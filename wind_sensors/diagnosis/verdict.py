@@ -302,6 +302,7 @@ def diagnose(
     def report(phase: str) -> Callable[[float], None]:
         return lambda share: progress(phase, share) if progress else None
 
+    baseline = baseline.for_station(recording.station)
     comparison = prepare(recording, baseline.station)
     guesses = {
         key: terms for key, terms in guesses_of(comparison, baseline.station).items()

@@ -1,4 +1,4 @@
-"""Checks of the readings themselves: silence, a value that repeats, coarse steps."""
+"""Checks of the readings themselves: silence, repeats, coarse steps, lost and doubled edges."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.observation import INTERVALS
 from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
 
@@ -20,6 +21,10 @@ LONGEST_STILL = 10.0
 COARSE = np.radians(3.0)
 """Steps of a reading larger than this are told [rad]."""
 
+ODD_SHARE = 0.01
+"""Share of intervals too long or too short, beyond the simulation's, that is told."""
+
+_SCATTER = 4.0
 _ALIVE = 8
 _BRISK = 4.0
 """Below this wind [m/s] a rotor that stands may merely be braked."""
@@ -99,8 +104,22 @@ def _rotor(
     return None
 
 
+def _intervals(
+    name: str, measured: FloatArray, expected: FloatArray, edges: int, start: int, stop: int
+) -> Oddity | None:
+    """Edges that are lost or doubled at random places, which no signature can foresee."""
+    for k, effect, what in ((0, "missed_pulses", "long"), (1, "extra_pulses", "short")):
+        beyond = float(measured[k] - expected[k])
+        scatter = np.sqrt(float(expected[k]) * edges + 1.0) / max(edges, 1)
+        if beyond > ODD_SHARE + _SCATTER * scatter:
+            text = f"{100.0 * beyond:.1f} % of the pulse intervals of {name} are far too {what}"
+            return Oddity(effect, name, start, stop, text)
+    return None
+
+
 def oddities(
     comparison: Comparison,
+    simulated: Simulated,
     station: Station,
     pulses: Mapping[str, Pulses],
     angles: Mapping[str, Angles],
@@ -111,6 +130,7 @@ def oddities(
 
     Args:
         comparison: The block.
+        simulated: The healthy station in its wind.
         station: The healthy station.
         pulses, angles: Simulated signals of the block.
         start, stop: The block without its lead-in [ns].
@@ -123,6 +143,17 @@ def oddities(
         if isinstance(instrument, Rotor) and name in pulses:
             found.append(
                 _rotor(name, recording.pulses.get(name), pulses[name], start, stop, speed)
+            )
+            channel = f"{name}/rotor_rate"
+            found.append(
+                _intervals(
+                    name,
+                    comparison.measured.statistics[channel][-INTERVALS:],
+                    simulated.statistics[channel][-INTERVALS:],
+                    pulses[name].time.size,
+                    start,
+                    stop,
+                )
             )
         elif name in angles:
             found.append(_vane(name, recording.angles.get(name), angles[name], start, stop))

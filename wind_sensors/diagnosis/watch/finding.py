@@ -139,7 +139,7 @@ class Finding:
     def opinion(self) -> str:
         """The candidates in words, with how sure."""
         if self.certain:
-            return f"This is {self.candidates[0].effect}."
+            return f"The readings themselves show {self.candidates[0].effect}."
         believed = [c for c in self.candidates if c.explained >= EXPLAINS]
         if not believed:
             return "Cannot tell yet why: no effect of the catalogue explains most of it."
@@ -151,7 +151,7 @@ class Finding:
     def message(self) -> str:
         """One line for people."""
         if self.located is None:
-            return f"{self.text[:1].upper()}{self.text[1:]}. {self.opinion}"
+            return f"{self.text[:1].upper()}{self.text[1:]}. {self.opinion} {SETTLE}"
         at = self.located
         return (
             f"{at.channel} departs from its simulation: mean {at.mean:+.2f} ± "

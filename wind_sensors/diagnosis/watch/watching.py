@@ -48,6 +48,9 @@ WHOLE = 4
 DRIFT_SPAN = 450_000_000_000
 """A drifting clock is taken to have run for so long before a block [ns]."""
 
+RECONSIDERED = 4
+"""The candidates of a lasting mismatch are weighed anew every so many blocks."""
+
 SETTLING = 2
 """Blocks after the learning in which the session's standing amplitudes still settle."""
 
@@ -318,7 +321,7 @@ class Watch:
         residual = raw - standing
         odd = self._silent(comparison, start, stop)
         odd += oddities(
-            comparison, self.station, *comparison.signals(self.station), start, stop
+            comparison, bank.without, self.station, *comparison.signals(self.station), start, stop
         )
         gram = signatures @ signatures.T
         evidence = Evidence(
@@ -398,10 +401,16 @@ class Watch:
             return
         since = [e for e in self._evidence if e.number >= onset_block]
         whole = [s for s in self._whole if s.number >= onset_block]
+        if len(whole) > 2 and whole[0].number == onset_block:
+            # The change happened somewhere within this one.
+            del whole[0]
         if not since or not whole:
             return
-        named = tuple(candidates(self._registry, self.station, since, whole))
         known = self.finding
+        if known is not None and not known.certain and number % RECONSIDERED:
+            named = known.candidates
+        else:
+            named = tuple(candidates(self._registry, self.station, since, whole))
         if (known is None or known.certain) and not self._confirmed(since, named):
             return
         where: Located = located(since, self._usual)
