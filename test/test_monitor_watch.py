@@ -33,7 +33,6 @@ PLANTED = {
     "missed_pulses": ("cup", {"dead_time": 0.0, "loss_probability": 0.03}),
     "extra_pulses": ("cup", {"bounce_probability": 0.03, "bounce_delay": 0.003}),
     "bearing_friction": ("cup", {"friction_speed": 1.5}),
-    "vane_inertia": ("vane", {"inertia_factor": 2.2}),
 }
 """Effects at three times the smallest size worth reporting."""
 
@@ -62,8 +61,8 @@ def watched(recording: Recording, drive: str = "reference") -> Watch:
 
 
 def test_healthy_hours_raise_no_alarm() -> None:
-    watch = watched(recorded(station(), 7200.0))
-    assert watch.blocks > 115
+    watch = watched(recorded(station(), 5400.0))
+    assert watch.blocks > 85
     assert watch.skipped == 0
     assert watch.finding is None
     assert not watch.past

@@ -105,6 +105,14 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         maximum=1000,
     ),
     Parameter(
+        "wait",
+        float,
+        _DEFAULTS.wait,
+        "How long after a block the comparison waits for late messages [s].",
+        minimum=0.0,
+        maximum=30.0,
+    ),
+    Parameter(
         "reliable_inputs",
         bool,
         False,
@@ -224,6 +232,7 @@ class MonitorNode(Node):
             block=_number(values["block"]),
             learning=int(_number(values["learning_blocks"])),
             false_alarms_per_day=_number(values["false_alarms_per_day"]),
+            wait=_number(values["wait"]),
         )
 
     def _wind_receiver(self, source: Input) -> Any:
