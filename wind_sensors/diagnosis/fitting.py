@@ -195,6 +195,11 @@ def fit(
     low = np.array([p.low for p in parameters])
     high = np.array([p.high for p in parameters])
     scale = np.array([p.difference for p in parameters])
+    air = whitener.comparison.drive.temperature
+    swing = 0.0 if air is None else float(np.ptp(air))
+    for k, parameter in enumerate(parameters):
+        if parameter.swing > swing and parameter.healthy is not None:
+            low[k] = high[k] = parameter.healthy
     values = np.clip(values_of(terms), low, high)
     cost, vector, first = problem.trial(values)
     if first is None:
@@ -228,8 +233,9 @@ def fit(
         if not improved or gained < 0.02 + 1e-5 * cost:
             break
     information = normal / np.outer(scale, scale)
+    width = np.array([p.high - p.low for p in parameters])
     covariance = np.asarray(
-        np.linalg.pinv(information + np.diag(1e-9 / (high - low) ** 2)), dtype=np.float64
+        np.linalg.pinv(information + np.diag(1e-9 / width**2)), dtype=np.float64
     )
     fitted = _with_values(terms, values)
     active = int(np.count_nonzero(np.diag(normal) > 1e-4))

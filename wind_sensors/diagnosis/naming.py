@@ -254,10 +254,32 @@ def name(
 ) -> Naming:
     """Find the effects that explain the recording.
 
+    An effect of the whole station may stand in for two of single instruments. Where it needs the
+    help of others, the search runs once more without such effects, and the better one counts.
+
     Args:
         searcher: Prepared search.
         progress: Called with the share done.
     """
+    found = _greedy(searcher, progress, frozenset())
+    broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
+    if not broad or len(found.fit.terms) < 2:
+        return found
+    narrow = _greedy(
+        searcher, progress, frozenset(n for n, e in searcher.effects.items() if e.everywhere)
+    )
+    if not narrow.fit.terms:
+        return found
+    again = fit(
+        narrow.whitener, searcher.station, found.fit.terms, searcher.bank.without, iterations=4
+    )
+    return narrow if _total(narrow.fit) < _total(again) else found
+
+
+def _greedy(
+    searcher: Searcher, progress: Callable[[float], None] | None, excluded: frozenset[str]
+) -> Naming:
+    """Add the best effect, judge the noise again, and so on while it pays."""
     whitener = searcher.whitener(searcher.bank.without)
     current = _no_terms(whitener, searcher)
     screened = tuple(
@@ -275,9 +297,15 @@ def name(
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, current.vector, number)
-            if starts[0].key not in used and not _is_a_stall(searcher, current, starts[0])
+            if starts[0].key not in used
+            and starts[0].effect.name not in excluded
+            and not _is_a_stall(searcher, current, starts[0])
         ]
-        windowed = _window_starts(searcher, whitener, current.vector, used)
+        windowed = [
+            starts
+            for starts in _window_starts(searcher, whitener, current.vector, used)
+            if starts[0].effect.name not in excluded
+        ]
         if not first and not windowed:
             scores = screen(
                 searcher.bank.templates, searcher.white_signatures(whitener), current.vector

@@ -55,6 +55,9 @@ REMAINDER_SHARE = 0.06
 
 REMAINDER_P = 0.05
 
+MOST_FREE_PARAMETERS = 2
+"""An explanation with more parameters must also stand out somewhere in the data."""
+
 INTERVAL_FACTOR = 1.96
 MISMATCH_FACTOR = 1.25
 """Intervals are wider than the noise alone would make them, for the simulation is not exact."""
@@ -261,6 +264,7 @@ def _verdict(
     equal: list[Alternative],
     remainder: tuple[float, float, float],
     detectable: Mapping[str, tuple[float, str, float]],
+    located_p: float,
 ) -> Verdict:
     left, p, share = remainder
     structured = left > 1.0 and p < REMAINDER_P
@@ -270,6 +274,9 @@ def _verdict(
         sizes = sorted(size for _, _, size in detectable.values())
         if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
             return "inconclusive"
+        return "none"
+    if naming.fit.active > MOST_FREE_PARAMETERS and located_p > REMAINDER_P:
+        # Many parameters that no region of the data asks for.
         return "none"
     if (structured and share > REMAINDER_SHARE) or _patchwork(naming):
         return "unknown"
@@ -320,7 +327,8 @@ def diagnose(
     remainder = _remainder(naming, bank)
     detectable = smallest_detectable(searcher, whitener)
     equal = _equal(naming)
-    verdict = _verdict(naming, equal, remainder, detectable)
+    located_p = bank.p_value(max(f.score for f in before))
+    verdict = _verdict(naming, equal, remainder, detectable, located_p)
     report("proving")(0.2)
     findings = _findings(naming, equal, before, bank, baseline, with_proof) if verdict in {
         "named", "ambiguous"

@@ -32,6 +32,8 @@ class Parameter:
         starts: Values from which the search begins (besides the screening's estimate).
         step: Size of a finite difference; 0: a tenth of `minimum`, or of the bounds' distance.
         wraps: Period of an angle, 0 for none.
+        swing: Smallest change of the air's temperature within the record [K] that the parameter
+            needs; with less it keeps its healthy value.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Parameter:
     starts: tuple[float, ...] = ()
     step: float = 0.0
     wraps: float = 0.0
+    swing: float = 0.0
 
     @property
     def difference(self) -> float:

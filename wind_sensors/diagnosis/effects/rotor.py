@@ -74,7 +74,10 @@ CALIBRATION_OFFSET = Effect(
 
 def _friction(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
-    return {"friction_speed": (entry.friction_speed**2 + values["friction_speed"] ** 2) ** 0.5}
+    return {
+        "friction_speed": (entry.friction_speed**2 + values["friction_speed"] ** 2) ** 0.5,
+        "friction_temperature_coefficient": values["temperature_coefficient"],
+    }
 
 
 BEARING_FRICTION = Effect(
@@ -89,10 +92,14 @@ BEARING_FRICTION = Effect(
         Parameter(
             "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 2.0)
         ),
+        Parameter(
+            "temperature_coefficient", "1/K", -1.0, 0.05, step=0.01, swing=3.0,
+            starts=(-0.05, -0.15),
+        ),
     ),
     applies=_is_rotor,
     update=_friction,
-    templates=({"friction_speed": 0.5},),
+    templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0},),
     confusable={
         "calibration_offset": "a speed sweep: friction fades as 1/U, an offset stays",
         "calibration_drift": "a speed sweep",
