@@ -35,6 +35,10 @@ SMALLEST_SIZE = 0.7
 
 MOST_EFFECTS = 3
 
+NARROW_SHARE = 0.85
+"""Effects of single instruments win over broad ones from this share of their gain on, if they
+need fewer parameters."""
+
 NEAR_AN_END = 8.0
 """A beginning or an end this close to the record's own [s] is none."""
 
@@ -268,12 +272,8 @@ def name(
     narrow = _greedy(
         searcher, progress, frozenset(n for n, e in searcher.effects.items() if e.everywhere)
     )
-    if not narrow.fit.terms:
-        return found
-    again = fit(
-        narrow.whitener, searcher.station, found.fit.terms, searcher.bank.without, iterations=4
-    )
-    return narrow if _total(narrow.fit) < _total(again) else found
+    simpler = 0 < narrow.fit.active < found.fit.active
+    return narrow if simpler and narrow.gain > NARROW_SHARE * found.gain else found
 
 
 def _greedy(

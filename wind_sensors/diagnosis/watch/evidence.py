@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,11 +10,14 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.learning import STANDING_TOLERANCES
 from wind_sensors.diagnosis.signatures import Template
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
+
+_LEAST_POWER = 0.05
 
 
 def unit(template: Template) -> float:
@@ -120,6 +123,31 @@ def channel_excess(
             square=float(np.sum((part * known) ** 2) / comparison.grid.n / share),
         )
     return out
+
+
+def departures(
+    registry: Registry, evidence: Evidence, seen: FloatArray, odd: Collection[str]
+) -> tuple[FloatArray, FloatArray]:
+    """Amplitudes of one block in smallest sizes and one over their noise variance, by place.
+
+    Args:
+        registry: Templates.
+        evidence: The block.
+        seen: Products of its signatures with the residual to test.
+        odd: Instruments whose readings are not to be trusted in this block.
+    """
+    size = len(registry.templates)
+    departure, precision = np.zeros(size), np.zeros(size)
+    power = np.diag(evidence.gram)
+    for place, p, product in zip(evidence.places, power, seen, strict=True):
+        template = registry.templates[place]
+        affected = odd and template.instrument in (*odd, PLATFORM, STATION)
+        if p < _LEAST_POWER or affected:
+            continue
+        scale = unit(template)
+        departure[place] = product / p * scale
+        precision[place] = p / scale**2
+    return departure, precision
 
 
 def standing_amplitudes(baseline: Baseline, registry: Registry) -> FloatArray:

@@ -12,9 +12,9 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.learning import default_baseline
 from wind_sensors.diagnosis.signatures import signature_bank, templates_of
+from wind_sensors.diagnosis.watch.confirming import confirmed
 from wind_sensors.diagnosis.watch.direct import Oddity, oddities
 from wind_sensors.diagnosis.watch.evidence import (
     Evidence,
@@ -22,11 +22,11 @@ from wind_sensors.diagnosis.watch.evidence import (
     Registry,
     Snapshot,
     channel_excess,
+    departures,
     standing_amplitudes,
-    unit,
 )
 from wind_sensors.diagnosis.watch.finding import Finding, Located, UsualMisfit, located
-from wind_sensors.diagnosis.watch.naming import Candidate, candidates, limited
+from wind_sensors.diagnosis.watch.naming import candidates, limited
 from wind_sensors.diagnosis.watch.normal import Normal
 from wind_sensors.diagnosis.watch.sequential import SequentialTest
 from wind_sensors.diagnosis.watch.settings import WatchSettings
@@ -53,15 +53,6 @@ RECONSIDERED = 4
 
 SETTLING = 2
 """Blocks after the learning in which the session's standing amplitudes still settle."""
-
-LEAST_GAIN = 30.0
-"""A candidate must remove so much misfit from a block, in squares of whitened differences."""
-
-LEAST_SIZE = 1.2
-"""And be so large, in smallest sizes worth reporting."""
-
-GROSS = 1.7
-"""Misfit relative to the usual that is told even if no effect explains it."""
 
 _SECOND = 1_000_000_000
 _LEAST_SEEN = 0.6
@@ -340,7 +331,9 @@ class Watch:
         # Without a baseline the test compares with the session's own beginning, before anything
         # is taken off.
         tested = evidence.seen if self.calibrated else signatures @ raw
-        departure, precision = self._departures(evidence, tested, {o.instrument for o in odd})
+        departure, precision = departures(
+            self._registry, evidence, tested, {o.instrument for o in odd}
+        )
         learning = not self.learnt
         if not learning:
             self._test.add(number, departure, precision)
@@ -356,7 +349,7 @@ class Watch:
         if learning and not self.calibrated and not odd:
             self._learning.add(places, gram, signatures @ raw, size)
         self.blocks += 1
-        self._judge(number, stop, odd)
+        self._judge(number, stop, odd, departure, precision)
 
     def _standing(self) -> FloatArray:
         if self.calibrated:
@@ -365,24 +358,14 @@ class Watch:
             return np.zeros(len(self._registry.templates))
         return self._learning.amplitudes(self._registry)
 
-    def _departures(
-        self, evidence: Evidence, tested: FloatArray, odd: set[str]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Amplitudes in smallest sizes and one over their noise variance, by place."""
-        size = len(self._registry.templates)
-        departure, precision = np.zeros(size), np.zeros(size)
-        power = np.diag(evidence.gram)
-        for place, p, seen in zip(evidence.places, power, tested, strict=True):
-            template = self._registry.templates[place]
-            affected = odd and template.instrument in (*odd, PLATFORM, STATION)
-            if p < 0.05 or affected:
-                continue
-            scale = unit(template)
-            departure[place] = seen / p * scale
-            precision[place] = p / scale**2
-        return departure, precision
-
-    def _judge(self, number: int, stop: int, odd: Sequence[Oddity]) -> None:
+    def _judge(
+        self,
+        number: int,
+        stop: int,
+        odd: Sequence[Oddity],
+        departure: FloatArray,
+        precision: FloatArray,
+    ) -> None:
         if odd:
             first = min(odd, key=lambda o: o.start)
             known = self.finding
@@ -395,9 +378,8 @@ class Watch:
             over = self.finding is not None and (
                 self.finding.certain or self._test.largest < _OVER_BELOW
             )
-            if over and self.finding is not None:
-                self.past.append(replace(self.finding, ended=stop - self._block_ns))
-                self.finding = None
+            if over:
+                self._end(stop - self._block_ns)
             return
         since = [e for e in self._evidence if e.number >= onset_block]
         whole = [s for s in self._whole if s.number >= onset_block]
@@ -411,7 +393,11 @@ class Watch:
             named = known.candidates
         else:
             named = tuple(candidates(self._registry, self.station, since, whole))
-        if (known is None or known.certain) and not self._confirmed(since, named):
+        if (known is None or known.certain) and not confirmed(since, named, self._usual):
+            # A difference that is real but small becomes normal.
+            self._test.settle(departure, precision)
+            if known is not None:
+                self._end(stop - self._block_ns)
             return
         where: Located = located(since, self._usual)
         onset = since[0].start if known is None else min(known.onset, since[0].start)
@@ -424,19 +410,11 @@ class Watch:
             blocks=len(since),
         )
 
-    def _confirmed(self, since: Sequence[Evidence], named: Sequence[Candidate]) -> bool:
-        """Whether an alarm is worth telling: an effect removes misfit, or much misfit is there.
-
-        Sums of many blocks notice differences that are real but too small to matter.
-        """
-        if any(c.gain >= LEAST_GAIN and c.size >= LEAST_SIZE for c in named):
-            return True
-        return any(
-            np.mean([b.channels[name].chi_square / b.channels[name].count for b in since])
-            > GROSS * self._usual.of(name)
-            for name in since[-1].channels
-            if all(name in b.channels for b in since)
-        )
+    def _end(self, time: int) -> None:
+        """The present mismatch is over."""
+        if self.finding is not None:
+            self.past.append(replace(self.finding, ended=time))
+            self.finding = None
 
     @property
     def _block_ns(self) -> int:
