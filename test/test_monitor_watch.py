@@ -72,7 +72,8 @@ def test_healthy_hours_raise_no_alarm() -> None:
 def test_an_effect_is_found_within_minutes_and_named_among_the_candidates(name: str) -> None:
     instrument, values = PLANTED[name]
     effect = catalogue()[name]
-    planted = with_effect(station(), effect, instrument, values, (BEGINNING, None))
+    complete = {p.name: p.healthy or 0.0 for p in effect.parameters} | values
+    planted = with_effect(station(), effect, instrument, complete, (BEGINNING, None))
     recording = recorded(planted)
     watch = watched(recording)
     finding = watch.finding

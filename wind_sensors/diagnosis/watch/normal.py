@@ -142,7 +142,8 @@ class Normal:
             edges, _ = _bands(expected.size, comparison)
             levels = _levels(expected, edges)
             fade = 1.0 - 1.0 / _MEMORY
-            part = np.nan_to_num(residual[at : at + expected.size] * trust.deviation)
+            scale = np.where(np.isfinite(trust.deviation), trust.deviation, 0.0)
+            part = residual[at : at + expected.size] * scale
             at += expected.size
             for total, addition in (
                 (state.measured, spectra.band_means(seen * seen, edges) / levels),
