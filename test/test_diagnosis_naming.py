@@ -107,8 +107,10 @@ def test_a_planted_effect_gets_its_name_and_its_size(
     assert found.verdict == "named"
     assert [f.term.key for f in found.findings] == [(effect, instrument)]
     estimate = found.findings[0].parameters[parameter]
+    # A 95 % interval misses one time in twenty; three standard errors hardly ever.
+    assert abs(estimate.value - value) < 1.5 * 0.5 * (estimate.high - estimate.low)
     healthy = found.findings[0].term.effect.parameters[0].healthy or 0.0
-    assert estimate.value - healthy == pytest.approx(value - healthy, rel=0.1)
+    assert estimate.value - healthy == pytest.approx(value - healthy, rel=0.2)
     proof = found.findings[0].proof
     assert proof is not None
     assert proof.excess_removed > 0.8

@@ -62,6 +62,9 @@ INTERVAL_FACTOR = 1.96
 MISMATCH_FACTOR = 1.25
 """Intervals are wider than the noise alone would make them, for the simulation is not exact."""
 
+FORM_ERROR = 0.025
+"""Standard error of a size, relative to it, that the simulation's form leaves."""
+
 TOO_BLUNT = 6.0
 """A record that shows no effect below this many smallest sizes is inconclusive."""
 
@@ -157,8 +160,10 @@ def _estimates(naming: Naming) -> list[dict[str, Estimate]]:
         found = {}
         for parameter in term.effect.parameters:
             variance = float(naming.fit.covariance[place, place])
-            error = INTERVAL_FACTOR * MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
             value = term.values[parameter.name]
+            departure = 0.0 if parameter.healthy is None else value - parameter.healthy
+            noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
+            error = INTERVAL_FACTOR * float(np.hypot(noise, FORM_ERROR * departure))
             found[parameter.name] = Estimate(
                 value,
                 max(value - error, parameter.low),
