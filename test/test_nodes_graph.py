@@ -195,8 +195,11 @@ def test_a_counter_that_wraps_gives_the_wind_of_single_edges(graph: Graph, tmp_p
         _offline_simulation("mast_cup_vane", run.recording.start), EstimatorSettings()
     )
     difference = velocity[:, :2] - from_edges.velocity[:, :2]
-    # At the very end an edge that did not come tells more than a count that did not change.
-    assert np.sqrt(np.mean(difference[100:-40] ** 2)) < 0.02
+    # A missed wrap would be metres per second. What remains is the start, in which counts and edges
+    # tell different things, and the very end, where an edge that did not come tells more than a
+    # count that did not change: small against what the estimate itself claims to know.
+    claimed = np.sqrt(np.mean(from_edges.covariance[:, (0, 1), (0, 1)]))
+    assert np.sqrt(np.mean(difference[100:-40] ** 2)) < 0.25 * claimed
 
 
 def test_a_looping_bag_makes_the_clock_jump_and_the_estimate_start_afresh(
