@@ -24,6 +24,16 @@ def test_a_mistake_is_told_in_one_line_with_status_2(
     assert "--force" in capsys.readouterr().err
 
 
+def test_an_effect_that_nobody_knows_cannot_be_taken_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "out"
+    assert wind(["diagnose", "nowhere", "-o", str(output), "--without", "gremlins"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "'gremlins'" in said and "wake_shadow" in said and "clock_drift" in said
+    assert not output.exists()
+
+
 def test_sealing_keeps_the_key_apart_and_to_its_owner(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

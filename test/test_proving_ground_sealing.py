@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from proving_ground.generate import RecordingSpec
+from proving_ground.minimum_sizes import MINIMUM_SIZES
+from proving_ground.scoring.card import is_failure
 from proving_ground.scoring.dose import dose_response
 from proving_ground.scoring.figures import confusion
 from proving_ground.scoring.intervals import covered
@@ -33,7 +35,8 @@ if sys.argv[1] == "baseline":
     sys.exit(0)
 target.mkdir()
 seen = sorted(str(p) for p in pathlib.Path(".").rglob("*"))
-print(json.dumps({"cwd": os.getcwd(), "seen": seen, "environment": dict(os.environ)}))
+said = {"cwd": os.getcwd(), "seen": seen, "environment": dict(os.environ), "told": sys.argv}
+print(json.dumps(said))
 verdict = {"verdict": "named", "findings": [{"effect": "vane_offset", "parameters": {}}]}
 (target / "diagnosis.json").write_text(json.dumps(verdict))
 """
@@ -60,9 +63,10 @@ def judged(
     findings: Sequence[Mapping[str, object]] = (),
     size: float = 3.0,
     stratum: str = "single",
+    without: Sequence[str] = (),
 ) -> Judged:
     causes = [{"effect": effect, "size_factor": size} for effect in truth]
-    answer = {"stratum": stratum, "kind": "A", "causes": causes}
+    answer = {"stratum": stratum, "kind": "A", "causes": causes, "without": list(without)}
     diagnosis = {"verdict": verdict, "findings": list(findings)}
     return judge("x", answer, diagnosis, {"seconds": 3.0, "processor": 5.0, "memory": 100.0})
 
@@ -159,6 +163,34 @@ def test_single_effects_come_at_every_size_and_every_effect_before_any_again() -
     assert len(set(seeds)) == len(seeds)
 
 
+def test_an_effect_taken_out_is_told_of_decoys_as_often_and_of_no_pair_that_hides() -> None:
+    strata = {"withheld": 8, "healthy": 6, "single": 10, "pair": 40}
+    plan = make_plan(0, np.random.default_rng(4), 1.0, 1, "ABC", strata)
+    withheld = [c for c in plan.cases if c.stratum == "withheld"]
+    decoys = [c for c in plan.cases if c.without and c.stratum != "withheld"]
+    assert len(withheld) == len(decoys) == 8
+    assert all(c.without == c.planted for c in withheld)
+    assert not any(set(c.without) & set(c.planted) for c in decoys)
+    told = [c.without[0] for c in [*withheld, *decoys]]
+    assert set(told) <= set(MINIMUM_SIZES)
+    assert not any("sensor_swap" in c.planted for c in plan.cases if c.stratum == "pair")
+
+
+def test_the_manifest_tells_what_to_leave_out_and_the_diagnosis_is_told(tmp_path: Path) -> None:
+    spy = tmp_path / "spy.py"
+    spy.write_text(SPY)
+    strata = {"withheld": 1, "healthy": 1}
+    folder = tmp_path / "set"
+    seal(folder, 2, 5, KEY, minutes=0.4, healthy_count=1, kinds="A", strata=strata)
+    entries = json.loads((folder / MANIFEST).read_text())["recordings"]
+    assert run_all(folder, program=(sys.executable, str(spy))) == 0
+    for name, entry in entries.items():
+        told = json.loads((folder / "runs" / name / "diagnose.log").read_text())["told"]
+        assert told[told.index("--without") + 1] == entry["without"][0]
+    (case,) = [j for j in judge_all(folder, open_answers(folder, KEY)) if j.stranger]
+    assert case.without == (case.stranger,)
+
+
 def all_specs(groups: tuple[tuple[RecordingSpec, ...], ...]) -> list[RecordingSpec]:
     return [spec for group in groups for spec in group]
 
@@ -179,6 +211,22 @@ def test_outcomes() -> None:
     assert judged(("vane_offset", "icing"), "named", one).outcome == "partly"
     assert judged(("unknown",), "named", one, stratum="unknown").outcome == "wrong name"
     assert judged((), "none", stratum="healthy").outcome == "none"
+
+
+def test_a_name_for_an_effect_taken_out_is_wrong_and_owning_up_is_right() -> None:
+    title = "an effect taken out of the catalogue: unknown, or alternatives without a claim"
+    one = ({"effect": "axis_tilt"},)
+    pair = ({"effect": "axis_tilt", "set": 1}, {"effect": "icing", "set": 1})
+    for verdict, findings, right in (
+        ("unknown", (), 1), ("ambiguous", pair, 1), ("named", one, 0), ("none", (), 0),
+    ):  # fmt: skip
+        case = judged(("vane_offset",), verdict, findings, 3.0, "withheld", ("vane_offset",))
+        rates = {r.title: r for r in promised_rates([case])}
+        assert (rates[title].hits, rates[title].total) == (right, 1)
+        assert is_failure(case) is not bool(right)
+        assert rates["a confident wrong name, all recordings"].hits == (verdict == "named")
+        assert rates["the exact effect, single, three times the minimum or more"].total == 0
+        assert confusion([case])[0] == ["taken out"]
 
 
 def test_a_recording_that_is_refused_is_no_crash() -> None:

@@ -11,7 +11,13 @@ from typing import Any
 from proving_ground.scoring.dose import Dose, dose_response
 from proving_ground.scoring.figures import draw_confusion, draw_doses, draw_rates
 from proving_ground.scoring.outcome import OUTCOMES, Judged
-from proving_ground.scoring.rates import Rate, mean_set_size, median_seconds, promised_rates
+from proving_ground.scoring.rates import (
+    Rate,
+    mean_set_size,
+    median_seconds,
+    open_minded,
+    promised_rates,
+)
 
 CARD = "score.md"
 NUMBERS = "score.json"
@@ -112,6 +118,8 @@ def is_failure(judged: Judged) -> bool:
         return judged.verdict != "none"
     if judged.stratum == "unknown":
         return judged.verdict != "unknown"
+    if judged.stratum == "withheld":
+        return not open_minded(judged)
     if judged.stratum == "too_little":
         return judged.verdict not in ("inconclusive", "refused", "none") and not judged.found
     if judged.outcome in ("none", "inconclusive") and judged.size < 1.0:
@@ -127,7 +135,10 @@ def _failures(judged: Sequence[Judged]) -> list[str]:
     for one in sorted(failed, key=lambda j: (j.stratum, j.truth, j.size)):
         truth = " + ".join(one.truth) or "nothing"
         if one.stranger:
-            truth = f"{one.stranger} (in no catalogue)"
+            gone = one.stratum == "withheld"
+            truth = (
+                f"{one.stranger} ({'taken out of the catalogue' if gone else 'in no catalogue'})"
+            )
         said = " + ".join([*one.named, *("{" + ", ".join(s) + "}" for s in one.sets)])
         said = f"{one.verdict}: {said}" if said else one.verdict
         size = f"{one.size:g}" if one.size else ""

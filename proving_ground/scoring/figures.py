@@ -23,6 +23,8 @@ def rows_of(judged: Sequence[Judged]) -> list[str]:
     for one in judged:
         if one.stratum == "too_little":
             rows.append("too little")
+        elif one.stratum == "withheld":
+            rows.append("taken out")
         elif not one.truth:
             rows.append("none")
         elif len(one.truth) > 1:
@@ -36,7 +38,9 @@ def confusion(judged: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarra
     """Rows, columns and counts of the confusion matrix."""
     rows = rows_of(judged)
     columns = [one.reported for one in judged]
-    tail = [name for name in ("several", "unknown", "none", "too little") if name in rows]
+    tail = [
+        name for name in ("several", "unknown", "taken out", "none", "too little") if name in rows
+    ]
     row_names = sorted(set(rows) - set(tail)) + tail
     last = [name for name in LAST_COLUMNS if name in columns]
     column_names = sorted(set(columns) - set(last)) + last

@@ -20,6 +20,9 @@ OUTCOMES = (
     "failed",
 )
 SILENT = ("unknown", "none", "inconclusive", "refused", "failed")
+UNKNOWN = "unknown"
+"""What stands in the place of a cause that the catalogue lacks."""
+
 REFUSAL = 2
 """Exit status of `wind diagnose` for a recording that it will not judge."""
 
@@ -30,8 +33,9 @@ NAMES_SOMETHING = ("exact", "ambiguous with the truth", "partly", "wrong name", 
 class Judged:
     """One recording of a sealed set, opened.
 
-    truth: names of the concealed causes ("unknown" for one that is in no catalogue); size: of the
-    smallest of them in multiples of its minimum; named: certain findings; sets: groups of
+    truth: names of the concealed causes ("unknown" for one that is in no catalogue, or was taken
+    out of it); stranger: its own name; without: effects taken out of the catalogue; size: of the
+    smallest cause in multiples of its minimum; named: certain findings; sets: groups of
     alternatives; seconds on the clock and of processors; excess_removed [1] on held-out data, or
     None.
     """
@@ -41,6 +45,7 @@ class Judged:
     kind: str
     truth: tuple[str, ...]
     stranger: str
+    without: tuple[str, ...]
     size: float
     verdict: str
     named: tuple[str, ...]
@@ -83,8 +88,11 @@ def judge(
 ) -> Judged:
     """Compare a diagnosis with its answer; a missing one counts as refused or as failed."""
     causes = answer["causes"]
-    truth = tuple(str(c["effect"]) for c in causes)
+    without = tuple(str(effect) for effect in answer.get("without", ()))
+    own = tuple(str(c["effect"]) for c in causes)
+    truth = tuple(UNKNOWN if effect in without else effect for effect in own)
     strangers = [str(c["stranger"]) for c in causes if "stranger" in c]
+    strangers += [effect for effect in own if effect in without]
     sizes = [float(c["size_factor"]) for c in causes]
     named, sets = findings_of(diagnosis) if diagnosis else ((), ())
     verdict = _verdict(diagnosis, run)
@@ -95,6 +103,7 @@ def judge(
         kind=str(answer["kind"]),
         truth=truth,
         stranger=strangers[0] if strangers else "",
+        without=without,
         size=min(sizes, default=0.0),
         verdict=verdict,
         named=named,
@@ -117,7 +126,7 @@ def findings_of(
     for finding in diagnosis.get("findings", []):
         effect = str(finding["effect"])
         group = finding.get("set")
-        if effect == "unknown":
+        if effect == UNKNOWN:
             continue
         if group is None:
             named.append(effect)
@@ -137,7 +146,7 @@ def outcome_of(
     """One of OUTCOMES."""
     if verdict in SILENT:
         return verdict
-    real = set(truth) - {"unknown"}
+    real = set(truth) - {UNKNOWN}
     if any(effect not in real for effect in named):
         return "wrong name"
     if any(not real & set(group) for group in sets):
@@ -145,7 +154,7 @@ def outcome_of(
     offered = set(named).union(*sets) if sets else set(named)
     if not offered:
         return "none"
-    if not real <= offered or "unknown" in truth:
+    if not real <= offered or UNKNOWN in truth:
         return "partly"
     return "ambiguous with the truth" if sets else "exact"
 

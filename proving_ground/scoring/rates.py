@@ -8,7 +8,7 @@ from statistics import median
 
 from scipy.stats import beta
 
-from proving_ground.scoring.outcome import NAMES_SOMETHING, Judged
+from proving_ground.scoring.outcome import NAMES_SOMETHING, UNKNOWN, Judged
 
 LARGE = 3.0
 SINGLE = ("single", "onset", "large")
@@ -71,7 +71,7 @@ def rate(
 
 
 def _known(judged: Judged) -> bool:
-    return bool(judged.truth) and "unknown" not in judged.truth
+    return bool(judged.truth) and UNKNOWN not in judged.truth
 
 
 def _names(judged: Judged) -> bool:
@@ -84,6 +84,11 @@ def _pair(judged: Judged) -> bool:
 
 def _single(judged: Judged) -> bool:
     return judged.stratum in SINGLE and judged.size >= LARGE
+
+
+def open_minded(judged: Judged) -> bool:
+    """Whether a diagnosis says that something is wrong without claiming what."""
+    return not judged.named and judged.verdict in ("unknown", "ambiguous")
 
 
 def promised_rates(judged: Sequence[Judged]) -> list[Rate]:
@@ -127,7 +132,7 @@ def promised_rates(judged: Sequence[Judged]) -> list[Rate]:
             "a confident wrong name, all recordings",
             judged,
             lambda j: True,
-            lambda j: j.outcome == "wrong name" or ("unknown" in j.truth and bool(j.named)),
+            lambda j: j.outcome == "wrong name" or (UNKNOWN in j.truth and bool(j.named)),
             "at most 3 %",
             at_most=0.03,
         ),
@@ -144,6 +149,22 @@ def promised_rates(judged: Sequence[Judged]) -> list[Rate]:
             judged,
             lambda j: j.stratum == "unknown",
             _names,
+            "at most 5 %",
+            at_most=0.05,
+        ),
+        rate(
+            "an effect taken out of the catalogue: unknown, or alternatives without a claim",
+            judged,
+            lambda j: j.stratum == "withheld",
+            open_minded,
+            "at least 90 %",
+            at_least=0.90,
+        ),
+        rate(
+            "an effect taken out of the catalogue given another name",
+            judged,
+            lambda j: j.stratum == "withheld",
+            lambda j: bool(j.named),
             "at most 5 %",
             at_most=0.05,
         ),

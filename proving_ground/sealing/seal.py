@@ -67,12 +67,13 @@ def seal(
         {"salt": secrets.token_hex(32), "drawing": drawing, "answers": answers}
     ).encode()
     committed = commitment(plain)
-    groups = {
-        name: f"station-{case.station + 1}" for name, case in zip(names, plan.cases, strict=True)
+    entries = {
+        name: {"healthy": f"station-{case.station + 1}", "without": list(case.without)}
+        for name, case in zip(names, plan.cases, strict=True)
     }
     manifest = {
         "commitment": committed,
-        "recordings": {name: {"healthy": groups[name]} for name in sorted(names)},
+        "recordings": {name: entries[name] for name in sorted(names)},
     }
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
     (folder / ANSWERS).write_bytes(encrypt(key, plain))
@@ -118,6 +119,7 @@ def _write(folder: Path, plan: Plan, names: list[str], jobs: int) -> dict[str, A
             "stratum": case.stratum,
             "station": case.station + 1,
             "kind": case.spec.station.kind,
+            "without": list(case.without),
             "causes": answer,
         }
         for name, case, answer in zip(names, plan.cases, made[first:], strict=True)

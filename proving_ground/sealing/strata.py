@@ -15,11 +15,12 @@ from proving_ground.stations import Station, random_station
 SIZES = (0.5, 1.0, 1.5, 2.0, 3.0, 6.0)
 SHARES = {
     "healthy": 0.22,
-    "single": 0.40,
-    "onset": 0.08,
+    "single": 0.36,
+    "onset": 0.07,
     "pair": 0.08,
     "confusable": 0.06,
-    "unknown": 0.11,
+    "unknown": 0.09,
+    "withheld": 0.07,
     "too_little": 0.05,
 }
 MANNERS = ("plain", "white", "coloured", "mismatch")
@@ -35,17 +36,26 @@ CONFUSABLE = (
     ("vane_eccentricity", "heading_deviation"),
     ("lever_arm", "platform_velocity_scale"),
 )
+ALONE = ("sensor_swap",)
+"""Effects that no pair holds: they hide whatever is planted beside them."""
+
+SPECIAL_CASES = ("platform_velocity",)
+"""Effects that another one contains (a velocity scale of nought is a missing velocity): taking
+them out of the catalogue would not make them unknown."""
+
 FIRST_SCORING_STATION = 10_000
 """Stations below are for development; scoring never draws them."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One recording of a sealed set: its stratum, which station it is of, and how it is made."""
+    """One recording of a sealed set: its stratum, which station it is of, how it is made, and the
+    effects that are taken out of the catalogue when it is diagnosed."""
 
     stratum: str
     station: int
     spec: RecordingSpec
+    without: tuple[str, ...] = ()
 
     @property
     def planted(self) -> tuple[str, ...]:
@@ -133,9 +143,32 @@ def make_plan(
             spec = with_effect(stations[index], planted, 0.0, next(seeds), minutes)
             if stratum == "too_little":
                 spec = _too_little(spec, rng)
-            cases.append(Case(stratum, index, spec))
+            without = tuple(p.effect for p in planted) if stratum == "withheld" else ()
+            cases.append(Case(stratum, index, spec, without))
+    cases = _with_decoys(cases, stations, rng)
     order = rng.permutation(len(cases))
     return Plan(stations, well, tuple(cases[i] for i in order))
+
+
+def _with_decoys(
+    cases: list[Case], stations: tuple[Station, ...], rng: np.random.Generator
+) -> list[Case]:
+    """The cases, as many of them as effects are withheld without an effect that is not theirs.
+
+    Whoever reads that an effect is taken out so learns nothing of whether it is concealed.
+    """
+    withheld = [c for c in cases if c.stratum == "withheld"]
+    others = [i for i, c in enumerate(cases) if c.stratum not in ("withheld", "too_little")]
+    out = list(cases)
+    for i in rng.permutation(others)[: len(withheld)].tolist():
+        able = set(_withholdable(stations[cases[i].station])) - set(cases[i].planted)
+        out[i] = replace(cases[i], without=(str(rng.choice(sorted(able))),))
+    return out
+
+
+def _withholdable(station: Station) -> list[str]:
+    names = applicable(station.kind, station.pulses_per_revolution)
+    return [n for n in names if n not in SPECIAL_CASES]
 
 
 def _shuffled(names: list[str], rng: np.random.Generator, length: int) -> list[str]:
@@ -171,10 +204,13 @@ def _planted(
     names = applicable(station.kind, station.pulses_per_revolution)
     if stratum == "unknown":
         return (Planted(next(strangers), float(rng.choice([2.0, 3.0, 5.0]))),)
+    if stratum == "withheld":
+        effect = str(rng.choice(_withholdable(station)))
+        return (Planted(effect, float(rng.choice([2.0, 3.0, 5.0]))),)
     if stratum == "large":
         return (Planted(str(rng.choice(names)), 4.0),)
     if stratum == "pair":
-        pair = rng.permutation(names)[:2]
+        pair = rng.permutation([n for n in names if n not in ALONE])[:2]
         return tuple(Planted(str(n), 3.0) for n in pair)
     if stratum == "confusable":
         able = [p for p in CONFUSABLE if p[0] in names and p[1] in names]

@@ -66,17 +66,19 @@ def run_all(
     """
     manifest = read_manifest(folder)
     todo = [
-        (name, str(entry["healthy"]))
+        (name, entry)
         for name, entry in manifest["recordings"].items()
         if not (folder / RUNS / name / RUN_FILE).exists()
     ]
-    stations = sorted({station for _, station in todo})
+    stations = sorted({str(entry["healthy"]) for _, entry in todo})
 
     def learn(station: str) -> Run | None:
         return learn_baseline(folder, station, program)
 
-    def one(item: tuple[str, str]) -> Run:
-        return run_one(folder, item[0], item[1], timeout, program, options)
+    def one(item: tuple[str, dict[str, Any]]) -> Run:
+        name, entry = item
+        left_out = [w for effect in entry.get("without", []) for w in ("--without", str(effect))]
+        return run_one(folder, name, str(entry["healthy"]), timeout, program, [*left_out, *options])
 
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         list(track(pool.map(learn, stations), "learning baselines", total=len(stations)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -11,6 +12,8 @@ from rich.table import Table
 
 from wind_sensors.cli.baseline import learnt, read_baseline, workers
 from wind_sensors.cli.other_references import diagnose_otherwise, other_reference
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
@@ -35,6 +38,10 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--baseline", metavar="FILE", type=Path, help="what `wind baseline` wrote, instead"
     )
+    parser.add_argument(
+        "--without", metavar="EFFECT", nargs="+", action="extend", default=[],
+        help="effects to take out of the catalogue",
+    )  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder")
     parser.add_argument("--force", action="store_true", help="replace an earlier diagnosis")
     parser.set_defaults(run=run)
@@ -42,6 +49,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> int:
     """Diagnose and write; 0 whatever the verdict."""
+    effects = catalogue_without(options.without)
     make_way(options.output, force=options.force)
     if options.baseline is not None and options.healthy:
         raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
@@ -60,12 +68,31 @@ def run(options: argparse.Namespace) -> int:
                 tasks[phase] = progress.add_task(phase, total=1.0)
             progress.update(tasks[phase], completed=share)
 
-        diagnosis = diagnose(recording, baseline, None, workers(), report)
-        written = write(options.output, diagnosis)
+        diagnosis = diagnose(recording, baseline, effects, workers(), report)
+        written = write(options.output, diagnosis, without=sorted(set(options.without)))
     _print(Console(), diagnosis)
+    if options.without:
+        print(f"taken out of the catalogue: {', '.join(sorted(set(options.without)))}")
     for path in written:
         print(f"wrote {path}")
     return 0
+
+
+def catalogue_without(names: Sequence[str]) -> dict[str, Effect]:
+    """The catalogue less some effects.
+
+    Raises:
+        UserError: There is no effect of a name.
+    """
+    known = catalogue()
+    unknown = sorted(set(names) - set(known))
+    if unknown:
+        raise UserError(
+            f"no effect is called {', '.join(map(repr, unknown))}.",
+            "--without",
+            f"The effects are {', '.join(sorted(known))}.",
+        )
+    return {name: effect for name, effect in known.items() if name not in names}
 
 
 def _print(console: Console, diagnosis: Diagnosis) -> None:

@@ -45,13 +45,20 @@ def diagnose_otherwise(
     """Diagnose with what there is, write, and say so; 0 whatever the verdict.
 
     Raises:
-        UserError: The recording does not suffice, or a baseline of another kind is given.
+        UserError: The recording does not suffice, or a baseline of another kind is given, or a
+            catalogue that cannot be used.
     """
     if options.baseline is not None:
         raise UserError(
             "a baseline file is for recordings with a measured reference.",
             str(options.baseline),
             "Give the healthy recordings with --healthy.",
+        )
+    if options.without:
+        raise UserError(
+            "effects can be taken out of the catalogue only where a reference wind was measured.",
+            "--without",
+            "Leave it out for this recording.",
         )
     report = _reporter(progress)
     if is_of_means(recording):

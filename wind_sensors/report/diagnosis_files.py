@@ -74,8 +74,13 @@ def series_topics(
     return out
 
 
-def write(folder: Path, diagnosis: Diagnosis) -> list[Path]:
+def write(folder: Path, diagnosis: Diagnosis, without: Sequence[str] = ()) -> list[Path]:
     """Write `diagnosis.json`, `report.html`, `station_corrected.yaml` and the residuals' bag.
+
+    Args:
+        folder: Where to.
+        diagnosis: What to write.
+        without: Effects that had been taken out of the catalogue; both files say so.
 
     Returns:
         What was written.
@@ -83,9 +88,10 @@ def write(folder: Path, diagnosis: Diagnosis) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     station_text = station_to_yaml(diagnosis.station, shipped_profiles())
     (folder / "diagnosis.json").write_text(
-        json.dumps(as_json(diagnosis), indent=1) + "\n", encoding="utf-8"
+        json.dumps({**as_json(diagnosis), "catalogue_without": list(without)}, indent=1) + "\n",
+        encoding="utf-8",
     )
-    (folder / "report.html").write_text(page(diagnosis), encoding="utf-8")
+    (folder / "report.html").write_text(page(diagnosis, without), encoding="utf-8")
     (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
     topics = series_topics(
         diagnosis.comparison,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -196,8 +197,20 @@ def _detectable(diagnosis: Diagnosis) -> str:
     )
 
 
-def page(diagnosis: Diagnosis) -> str:
-    """The report as one HTML file without outside references."""
+def _taken_out(without: Sequence[str]) -> str:
+    if not without:
+        return ""
+    names = escape(", ".join(words(name) for name in without))
+    return f"<p><b>Taken out of the catalogue, and so not looked for:</b> {names}.</p>"
+
+
+def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
+    """The report as one HTML file without outside references.
+
+    Args:
+        diagnosis: What is told.
+        without: Effects that had been taken out of the catalogue.
+    """
     wanted = {f.located.region.channel for f in diagnosis.findings} or {
         f.region.channel for f in diagnosis.unexplained.regions[:1]
     }
@@ -223,6 +236,7 @@ def page(diagnosis: Diagnosis) -> str:
         _left(diagnosis),
         _detectable(diagnosis),
         f"<p class='muted'>Healthy recordings behind the baseline: {escape(healthy)}.</p>",
+        _taken_out(without),
     ]
     return document(f"Diagnosis of {diagnosis.recording}", "".join(body))
 
