@@ -337,3 +337,39 @@ def test_on_the_real_mast_a_planted_gain_is_named_and_the_mast_as_it_is_gets_no_
     healthy = part(0, 6500, 1.0)
     assert names(part(6500, 13_000, 1.0), healthy) == []
     assert names(part(6500, 13_000, 1.04), healthy)[0][:2] == ("calibration_drift", "Spd40mS")
+
+
+def _stiff_in_the_cold(wind: FloatArray, temperature: FloatArray) -> FloatArray:
+    """Integrates dy/dt = ((U - y) U - k(T)) / l0 until nothing moves: grease twice as stiff 20 K
+    below the temperature of the calibration."""
+    k = 2.5 * (1.0 - 0.05 * (temperature - 15.0))
+    y = wind.copy()
+    for _ in range(400):
+        y = np.maximum(y + 0.05 * ((wind - y) * wind - k) / 3.0 * 2.0, 0.0)
+    return np.asarray(y)
+
+
+@pytest.mark.parametrize("stiff", [True, False])
+def test_friction_follows_the_temperature_only_where_held_out_blocks_say_so(stiff: bool) -> None:
+    station, time, values = made(13)
+    _, _, before = made(113)
+    season = 5.0 + 12.0 * np.sin(np.arange(ROWS) / 500.0) + 3.0 * np.sin(np.arange(ROWS) / 23.0)
+    at = season if stiff else np.full(ROWS, 15.0)
+    wind = values["two_a"] - 0.3
+    values["two_a"] = np.maximum(_stiff_in_the_cold(wind, at), 0.0) + 0.3
+    headings = {name: values[name] for name in ("vane_a", "vane_b", "vane_c")}
+    speeds = {name: values[name] for name in CUPS}
+    recording = recording_of(station, time, speeds, headings, season)
+    normal = learn_means([(recorded(station, time, before), {})])
+    found = {
+        f.term.instrument: f
+        for f in diagnose_means(recording, {}, normal).findings
+        if f.term.effect.name == "bearing_friction"
+    }
+    assert set(found) == {"two_a"}
+    estimates = found["two_a"].parameters
+    assert estimates["friction_speed"].value == pytest.approx(np.sqrt(2.5), rel=0.12)
+    if stiff:
+        assert estimates["temperature_coefficient"].value == pytest.approx(-0.05, abs=0.015)
+    else:
+        assert "temperature_coefficient" not in estimates

@@ -21,15 +21,9 @@ from wind_sensors.diagnosis.latent.headings import (
     heading_spread,
     residual_of,
 )
-from wind_sensors.diagnosis.means.search import (
-    Bench,
-    Explained,
-    Named,
-    fit,
-    held_out,
-    intervals,
-    search,
-)
+from wind_sensors.diagnosis.means.bench import Bench
+from wind_sensors.diagnosis.means.fits import fit, held_out, intervals
+from wind_sensors.diagnosis.means.search import Explained, Named, search
 from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region

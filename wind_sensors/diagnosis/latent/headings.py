@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.means.averages import BoolArray
-from wind_sensors.diagnosis.means.search import Bench
+from wind_sensors.diagnosis.means.bench import Bench
 from wind_sensors.errors import UserError
 from wind_sensors.motion.platform_track import Motion, PlatformTrack
 from wind_sensors.simulation.drive import Drive

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means import panels, silences
 from wind_sensors.diagnosis.means.averages import Averages, averages_of
+from wind_sensors.diagnosis.means.bench import bench_of
 from wind_sensors.diagnosis.means.culprit import likelihood_of_first
 from wind_sensors.diagnosis.means.findings import (
     PairWork,
@@ -20,6 +21,7 @@ from wind_sensors.diagnosis.means.findings import (
     findings_of_pair,
     findings_of_vane,
 )
+from wind_sensors.diagnosis.means.fits import intervals
 from wind_sensors.diagnosis.means.pair import (
     cells,
     direction_of,
@@ -29,8 +31,8 @@ from wind_sensors.diagnosis.means.pair import (
     standing_of,
     table_of,
 )
-from wind_sensors.diagnosis.means.pair_effects import rotor_effects
-from wind_sensors.diagnosis.means.search import Named, bench_of, intervals, is_normal, search
+from wind_sensors.diagnosis.means.pair_effects import rotor_effects, warming
+from wind_sensors.diagnosis.means.search import Named, is_normal, search
 from wind_sensors.diagnosis.means.vanes import (
     vane_bench,
     vane_effects,
@@ -181,8 +183,10 @@ def diagnose_means(
         if healthy is not None:
             usual = pair_of(healthy.averages, first, second, standing)
             normal = is_normal(bench_of(usual, recording.station))
+        warm = warming(pair.averages.temperature)
+        wider = None if warm is None else {warm.name: warm}
         explained = search(
-            bench, rotor_effects(), (first, second), along, normal=normal
+            bench, rotor_effects(), (first, second), along, normal=normal, wider=wider
         )
         others = [r for p in pairs for r in p if r not in (first, second)]
         named = [

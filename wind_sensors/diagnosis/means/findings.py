@@ -11,18 +11,11 @@ from scipy import stats
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import Averages
+from wind_sensors.diagnosis.means.bench import CLIP, Bench, halves, huber
+from wind_sensors.diagnosis.means.fits import fit, intervals
 from wind_sensors.diagnosis.means.pair import Pair, cells, table_of
 from wind_sensors.diagnosis.means.pair_effects import rotor_effects
-from wind_sensors.diagnosis.means.search import (
-    CLIP,
-    Bench,
-    Explained,
-    Named,
-    fit,
-    halves,
-    huber,
-    intervals,
-)
+from wind_sensors.diagnosis.means.search import Explained, Named
 from wind_sensors.diagnosis.means.silences import COLD, WARM, Ice, Silence
 from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
 from wind_sensors.diagnosis.proof import Proof

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+import numpy.typing as npt
+
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter
 
@@ -19,17 +22,24 @@ SINCE_A_MOMENT = ("calibration_drift", "calibration_offset", "vane_offset")
 WIDEST_WAKE = 15.0
 """Standard deviation of the widest wake [deg]."""
 
+FRICTION = "bearing_friction"
+
+FEWEST_KNOWN = 0.9
+"""Share of the means whose temperature must be known for it to explain anything."""
+
 _NOT_SEEN = {
     "angular_response": ("skewness",),
     "flow_distortion": ("deflection",),
+    FRICTION: ("temperature_coefficient",),
 }
-_AT_REST = {"skewness": 0.0, "deflection": 0.0}
+_AT_REST = {"skewness": 0.0, "deflection": 0.0, "temperature_coefficient": 0.0}
 
 
 def rotor_effects() -> dict[str, Effect]:
     """The catalogue's effects for mean speeds, without parameters that a mean cannot show.
 
-    Each concerns one rotor: on opposite booms the mount does opposite things to them.
+    Each concerns one rotor: on opposite booms the mount does opposite things to them. Friction is
+    the same at all temperatures here; see `warming`.
     """
     found = {}
     known = catalogue()
@@ -55,6 +65,22 @@ def rotor_effects() -> dict[str, Effect]:
             everywhere=False,
         )
     return found
+
+
+def warming(temperature: npt.NDArray[np.float64]) -> Effect | None:
+    """Friction that changes with temperature; None where the record's air does not change enough.
+
+    Args:
+        temperature: [deg C]; NaN where unknown.
+    """
+    effect = catalogue()[FRICTION]
+    known = temperature[np.isfinite(temperature)]
+    needed = max(p.swing for p in effect.parameters)
+    # The range of nearly all means: a single odd reading is no swing.
+    if known.size < FEWEST_KNOWN * temperature.size or known.size == 0:
+        return None
+    swing = float(np.subtract(*np.quantile(known, (0.95, 0.05))))
+    return replace(effect, everywhere=False) if swing >= needed else None
 
 
 def _physical(parameter: Parameter) -> Parameter:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.means.averages import Averages, BoolArray, blocks_of, part
+from wind_sensors.diagnosis.means.bench import Bench
 from wind_sensors.diagnosis.means.mean_response import mean_heading
 from wind_sensors.diagnosis.means.pair import MOST_ROWS, noise_of
-from wind_sensors.diagnosis.means.search import Bench
 from wind_sensors.motion.frames import wrap
 from wind_sensors.station.model import Station
 
