@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from proving_ground.peers import table
 from proving_ground.peers.methods import forward_bic
+from proving_ground.peers.rows import FILE, read_rows, write_table
 from proving_ground.peers.table import autoregression, excess, peer_row, threshold, whiten
 
 
@@ -53,6 +58,68 @@ def test_a_peer_is_judged_like_the_diagnosis() -> None:
         "b": {"stratum": "healthy", "causes": []},
         "c": {"stratum": "unknown", "causes": [{"effect": "unknown", "size_factor": 3.0}]},
     }
+    assert peer_row("x", {"c": {"icing"}}, answers, 1.0).unknown_named == (1, 1)
     row = peer_row("x", {"a": {"vane_offset"}, "b": {"icing"}, "c": set()}, answers, 1.0)
     assert (row.exact, row.false_alarms, row.unknown_named) == ((1, 1), (1, 1), (0, 1))
     assert row.wrong == (1, 3)
+
+
+def test_a_matched_threshold_allows_the_alarms_of_the_diagnosis_and_no_more() -> None:
+    over = {
+        name: {"icing": value} for name, value in zip("abcd", (1.0, 4.0, 2.0, 9.0), strict=True)
+    }
+    answers = {name: {"stratum": "healthy"} for name in "abc"} | {"d": {"stratum": "single"}}
+    for alarms in range(4):
+        named = table.names_above(over, table.limit_with(over, answers, alarms))
+        assert sum(bool(named[name]) for name in "abc") == alarms
+
+
+def test_a_name_for_an_effect_taken_out_is_a_name_for_the_unknown() -> None:
+    cause = {"effect": "vane_offset", "size_factor": 3.0}
+    answers = {"a": {"stratum": "withheld", "causes": [cause], "without": ["vane_offset"]}}
+    row = peer_row("x", {"a": {"vane_damping"}}, answers, 1.0)
+    assert (row.unknown_named, row.wrong, row.exact) == ((1, 1), (1, 1), (0, 0))
+
+
+def test_the_comparison_runs_from_regressors_to_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A planted signature is named, noise is not, and what is taken out cannot be."""
+    monkeypatch.setattr(table, "require_peers", lambda: None)
+    monkeypatch.setattr(table, "METHODS", {"forward": forward_bic})
+    effects = np.array(["icing", "vane_offset", "wake_shadow"])
+    rng = np.random.default_rng(5)
+    planted = {"found": 1, "gone": 1, "well": None}
+    places = [tmp_path / "recordings" / name for name in planted]
+    places += [tmp_path / "healthy" / "station-1" / f"healthy-{i}" for i in range(6)]
+    (tmp_path / "regressors").mkdir()
+    for place in places:
+        place.mkdir(parents=True)
+        signatures = rng.standard_normal((600, 3))
+        column = planted.get(place.name)
+        residual = rng.standard_normal(600)
+        if column is not None:
+            residual += 3.0 * signatures[:, column]
+        np.savez(
+            table.regressor_file(tmp_path, place), residual=residual, signatures=signatures,
+            effects=effects, sizes=np.ones(3), channel=np.zeros(600, dtype=int),
+        )  # fmt: skip
+    cause = {"effect": "vane_offset", "size_factor": 3.0}
+    answers = {
+        "found": {"stratum": "single", "causes": [cause], "without": []},
+        "gone": {"stratum": "withheld", "causes": [cause], "without": ["vane_offset"]},
+        "well": {"stratum": "healthy", "causes": [], "without": []},
+    }
+    entries = {n: {"healthy": "station-1", "without": a["without"]} for n, a in answers.items()}
+    (tmp_path / "manifest.json").write_text(json.dumps({"recordings": entries}))
+    rows = table.compare(tmp_path, answers, [])
+    assert [r.method for r in rows] == ["wind diagnose", "forward", "forward, whitened"]
+    for row in rows[1:]:
+        assert (row.exact, row.false_alarms, row.unknown_named) == ((1, 1), (0, 1), (0, 1))
+        assert row.matched == (1, 1)
+    page = write_table(tmp_path / "score", rows[1:], {"sealed": 3})
+    assert "| forward, whitened | 0 % (0 to 98) | 100 % (3 to 100) |" in page.read_text()
+    assert read_rows(tmp_path / "score" / FILE) == (
+        rows[1:],
+        {"sealed": 3},
+    )

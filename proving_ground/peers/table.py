@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rich.progress import track
 
 from proving_ground.inflow import Array
 from proving_ground.peers.methods import METHODS, require_peers
-from proving_ground.scoring.outcome import NAMES_SOMETHING, Judged
-from proving_ground.scoring.rates import LARGE, clopper_pearson
+from proving_ground.peers.rows import PeerScore
+from proving_ground.scoring.outcome import NAMES_SOMETHING, UNKNOWN, Judged
+from proving_ground.scoring.rates import LARGE
 from proving_ground.sealing.seal import HEALTHY, RECORDINGS
 from proving_ground.sealing.trial import read_manifest
 
@@ -28,19 +28,8 @@ FALSE_ALARMS = 0.05
 LONGEST_MEMORY = 20
 
 Importance = dict[str, float]
-
-
-@dataclass(frozen=True)
-class PeerScore:
-    """One method's row: counts of hits and cases by column, and median seconds."""
-
-    method: str
-    false_alarms: tuple[int, int]
-    exact: tuple[int, int]
-    included: tuple[int, int]
-    wrong: tuple[int, int]
-    unknown_named: tuple[int, int]
-    seconds: float
+Item = TypeVar("Item")
+Made = TypeVar("Made")
 
 
 def collect_regressors(folder: Path, jobs: int = 1) -> None:
@@ -49,8 +38,16 @@ def collect_regressors(folder: Path, jobs: int = 1) -> None:
     todo = [(s, regressor_file(folder, s)) for s in sources]
     todo = [(s, t) for s, t in todo if not t.exists()]
     (folder / REGRESSORS).mkdir(exist_ok=True)
-    with ProcessPoolExecutor(max(1, jobs)) as pool:
-        list(track(pool.map(_collect, todo), "simulating signatures", total=len(todo)))
+    list(track(_each(_collect, todo, jobs), "simulating signatures", total=len(todo)))
+
+
+def _each(function: Callable[[Item], Made], items: Iterable[Item], jobs: int) -> Iterator[Made]:
+    """Results in the order of the items, from so many processes."""
+    if jobs == 1:
+        yield from map(function, items)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        yield from pool.map(function, items)
 
 
 def regressor_file(folder: Path, recording: Path) -> Path:
@@ -104,8 +101,13 @@ def autoregression(signal: Array) -> Array:
     return chosen
 
 
-def importances(path: Path, methods: Sequence[str], whitened: bool) -> dict[str, Importance]:
-    """Share of the residual's deviation that each effect explains, for each method."""
+def importances(
+    path: Path, methods: Sequence[str], whitened: bool, without: Sequence[str] = ()
+) -> dict[str, Importance]:
+    """Share of the residual's deviation that each effect explains, for each method.
+
+    The signatures of effects `without` are left out, as they are for the diagnosis.
+    """
     with np.load(path) as file:
         residual, signatures = file["residual"], file["signatures"]
         effects, channel = file["effects"], file["channel"]
@@ -114,7 +116,7 @@ def importances(path: Path, methods: Sequence[str], whitened: bool) -> dict[str,
     if whitened:
         residual, signatures = whiten(residual, signatures, channel)
     scale = signatures.std(axis=0)
-    seen = scale > 1e-9
+    seen = (scale > 1e-9) & ~np.isin(effects, list(without))
     columns = signatures[:, seen] / scale[seen]
     size = float(np.sqrt(np.mean(residual**2)))
     found = {}
@@ -135,11 +137,14 @@ def importances(path: Path, methods: Sequence[str], whitened: bool) -> dict[str,
     return found
 
 
-def _timed(item: tuple[Path, bool]) -> tuple[dict[str, Importance], float]:
-    path, whitened = item
-    begun = time.process_time()
-    found = importances(path, list(METHODS), whitened)
-    return found, (time.process_time() - begun) / len(METHODS)
+def _timed(item: tuple[Path, bool, Sequence[str]]) -> dict[str, tuple[Importance, float]]:
+    path, whitened, without = item
+    found = {}
+    for method in METHODS:
+        begun = time.process_time()
+        importance = importances(path, [method], whitened, without)[method]
+        found[method] = (importance, time.process_time() - begun)
+    return found
 
 
 def excess(found: Importance, healthy: Sequence[Importance]) -> Importance:
@@ -172,45 +177,74 @@ def compare(
     rows = [own_row(judged)]
     for whitened in (False, True):
         paths = sorted((folder / REGRESSORS).glob("*.npz"))
-        with ProcessPoolExecutor(max(1, jobs)) as pool:
-            done = pool.map(_timed, [(p, whitened) for p in paths])
-            results = dict(zip(paths, track(done, "peers", total=len(paths)), strict=True))
+        done = _each(_timed, [(p, whitened, _without(manifest, p)) for p in paths], jobs)
+        results = dict(zip(paths, track(done, "peers", total=len(paths)), strict=True))
         for method in METHODS:
-            by_name = {p.stem: results[p][0][method] for p in paths}
-            seconds = float(np.median([results[p][1] for p in paths]))
+            by_name = {p.stem: results[p][method][0] for p in paths}
+            seconds = float(np.median([results[p][method][1] for p in paths]))
             groups: dict[str, list[Importance]] = {}
             for stem, found in by_name.items():
                 if stem.startswith("station-"):
                     groups.setdefault(stem.rsplit("-healthy", 1)[0], []).append(found)
-            limit = threshold(list(groups.values()))
-            named = {
-                name: {
-                    effect
-                    for effect, value in excess(
-                        by_name[name], groups[manifest[name]["healthy"]]
-                    ).items()
-                    if value > limit
-                }
+            over = {
+                name: excess(by_name[name], groups[manifest[name]["healthy"]])
                 for name in answers
                 if name in by_name
             }
             label = f"{method}{', whitened' if whitened else ''}"
-            rows.append(peer_row(label, named, answers, seconds))
+            named = names_above(over, threshold(list(groups.values())))
+            row = peer_row(label, named, answers, seconds)
+            limit = limit_with(over, answers, rows[0].false_alarms[0])
+            matched = peer_row(label, names_above(over, limit), answers, seconds).exact
+            rows.append(replace(row, matched=matched))
     return rows
+
+
+def names_above(over: Mapping[str, Importance], limit: float) -> dict[str, set[str]]:
+    """Effects whose excess is above a limit, for each recording."""
+    return {
+        name: {effect for effect, value in found.items() if value > limit}
+        for name, found in over.items()
+    }
+
+
+def limit_with(over: Mapping[str, Importance], answers: dict[str, Any], alarms: int) -> float:
+    """The lowest limit with so many false alarms among the sealed healthy recordings, or fewer.
+
+    It is set with the answers in hand, in the method's favour.
+    """
+    largest = sorted(
+        (max(over[name].values(), default=0.0) for name in over if _is_healthy(answers[name])),
+        reverse=True,
+    )
+    return largest[alarms] if alarms < len(largest) else 0.0
+
+
+def _is_healthy(answer: dict[str, Any]) -> bool:
+    return str(answer["stratum"]) == "healthy"
+
+
+def _without(manifest: dict[str, Any], regressors: Path) -> list[str]:
+    """Effects left out for a recording; healthy ones of a station have no entry and lack none."""
+    return [str(effect) for effect in manifest.get(regressors.stem, {}).get("without", ())]
 
 
 def peer_row(
     label: str, named: dict[str, set[str]], answers: dict[str, Any], seconds: float
 ) -> PeerScore:
     """Count a method's names against the answers."""
-    truth = {n: {str(c["effect"]) for c in answers[n]["causes"]} for n in named}
+    gone = {n: set(answers[n].get("without", ())) for n in named}
+    truth = {
+        n: {UNKNOWN if c["effect"] in gone[n] else str(c["effect"]) for c in answers[n]["causes"]}
+        for n in named
+    }
     size = {
         n: min((float(c["size_factor"]) for c in answers[n]["causes"]), default=0.0) for n in named
     }
     stratum = {n: str(answers[n]["stratum"]) for n in named}
     well = [n for n in named if stratum[n] == "healthy"]
     large = [n for n in named if stratum[n] in ("single", "onset") and size[n] >= LARGE]
-    strange = [n for n in named if stratum[n] == "unknown"]
+    strange = [n for n in named if UNKNOWN in truth[n]]
     return PeerScore(
         method=label,
         false_alarms=(sum(bool(named[n]) for n in well), len(well)),
@@ -226,50 +260,17 @@ def own_row(judged: Sequence[Judged]) -> PeerScore:
     """The diagnosis's own row."""
     well = [j for j in judged if j.stratum == "healthy"]
     large = [j for j in judged if j.stratum in ("single", "onset") and j.size >= LARGE]
-    strange = [j for j in judged if j.stratum == "unknown"]
-    wrong = [j for j in judged if j.outcome in ("wrong name", "wrong set")]
+    strange = [j for j in judged if UNKNOWN in j.truth]
+    wrong = [j for j in judged if set(j.named) - set(j.truth)]
+    exact = (sum(j.outcome == "exact" for j in large), len(large))
     times = [j.seconds for j in judged if j.verdict != "failed"]
     return PeerScore(
         method="wind diagnose",
         false_alarms=(sum(j.outcome in NAMES_SOMETHING for j in well), len(well)),
-        exact=(sum(j.outcome == "exact" for j in large), len(large)),
+        exact=exact,
+        matched=exact,
         included=(sum(j.found for j in large), len(large)),
         wrong=(len(wrong), len(judged)),
-        unknown_named=(sum(j.outcome in NAMES_SOMETHING for j in strange), len(strange)),
+        unknown_named=(sum(bool(j.named) for j in strange), len(strange)),
         seconds=float(np.median(times)) if times else float("nan"),
     )
-
-
-def write_table(folder: Path, rows: Sequence[PeerScore]) -> Path:
-    """Write the comparison as a page and as numbers; the page's path."""
-    folder.mkdir(parents=True, exist_ok=True)
-    lines = [
-        "# Peers on the same recordings",
-        "",
-        "Same residuals, same signatures of the same catalogue, the same healthy recordings to "
-        f"tune on; the peers' thresholds are set for {100 * FALSE_ALARMS:.0f} % false alarms on "
-        "those. Intervals at 95 %.",
-        "",
-        "| method | healthy named | exact (single, 3 x and more) | truth included | a wrong name, "
-        "all | unknown named | seconds |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        cells = [
-            _cell(c)
-            for c in (row.false_alarms, row.exact, row.included, row.wrong, row.unknown_named)
-        ]
-        lines.append(f"| {row.method} | " + " | ".join(cells) + f" | {row.seconds:.1f} |")
-    page = folder / "peers.md"
-    page.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    numbers = json.dumps([asdict(r) for r in rows], indent=1)
-    (folder / "peers.json").write_text(numbers, encoding="utf-8")
-    return page
-
-
-def _cell(count: tuple[int, int]) -> str:
-    hits, total = count
-    if not total:
-        return ""
-    low, high = clopper_pearson(hits, total)
-    return f"{100 * hits / total:.0f} % ({100 * low:.0f} to {100 * high:.0f})"

@@ -20,6 +20,7 @@ from proving_ground.real.turbulence import on_grid, read_sonic, record_in
 from proving_ground.stations import random_station
 from wind_sensors.errors import UserError
 
+NUMBERS = "real.json"
 STATION_SEED = 20_001
 ADDED_WIND = 4.0
 LONGEST = 900.0
@@ -62,9 +63,8 @@ def run_real(output: Path, local: Path | None = None) -> Path:
             say(f"   {found.record}, {found.planted}: {found.verdict}")
     page = output / "real.md"
     page.write_text(_page(rows, notes), encoding="utf-8")
-    (output / "real.json").write_text(
-        json.dumps([vars(r) for r in rows], indent=1), encoding="utf-8"
-    )
+    numbers = json.dumps([vars(r) for r in rows], indent=1)
+    (output / NUMBERS).write_text(numbers + "\n", encoding="utf-8")
     return page
 
 
@@ -182,9 +182,15 @@ def _page(rows: Sequence[Row], notes: Sequence[str]) -> str:
         "they were planted. Instruments in real turbulence are the proving ground's, driven by "
         f"the sonic's wind with {ADDED_WIND:g} m/s of steady wind added.",
         "",
-        "| record | planted | verdict | seconds |",
-        "|---|---|---|---|",
+        *row_table([vars(r) for r in rows]),
     ]
-    lines += [f"| {r.record} | {r.planted} | {r.verdict} | {r.seconds:.0f} |" for r in rows]
     lines += ["", *[f"- {note}" for note in notes]] if notes else []
     return "\n".join(lines) + "\n"
+
+
+def row_table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """What was planted into real records and what was said, as a table."""
+    lines = ["| record | planted | verdict | seconds |", "|---|---|---|---|"]
+    return lines + [
+        f"| {r['record']} | {r['planted']} | {r['verdict']} | {r['seconds']:.0f} |" for r in rows
+    ]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from proving_ground.scoring.dose import Dose, dose_response
 from proving_ground.scoring.figures import draw_confusion, draw_doses, draw_rates
-from proving_ground.scoring.outcome import OUTCOMES, Judged
+from proving_ground.scoring.outcome import OUTCOMES, Judged, judged_from
 from proving_ground.scoring.rates import (
     Rate,
     mean_set_size,
@@ -18,30 +18,60 @@ from proving_ground.scoring.rates import (
     open_minded,
     promised_rates,
 )
+from wind_sensors.errors import UserError
 
 CARD = "score.md"
 NUMBERS = "score.json"
 
 
+@dataclass(frozen=True)
+class Card:
+    """The scores of one set: what they are of, every recording, the promised rates, the curves."""
+
+    about: dict[str, Any]
+    judged: tuple[Judged, ...]
+    rates: tuple[Rate, ...]
+    doses: tuple[Dose, ...]
+
+
+def card_of(judged: Sequence[Judged], about: dict[str, Any]) -> Card:
+    """Count and fit what is told of a set."""
+    return Card(about, tuple(judged), tuple(promised_rates(judged)), tuple(_doses(judged)))
+
+
 def write_card(folder: Path, judged: Sequence[Judged], about: dict[str, Any]) -> list[Rate]:
     """Write the card, its figures and its numbers into a folder; the promised rates."""
     folder.mkdir(parents=True, exist_ok=True)
-    rates = promised_rates(judged)
-    doses = _doses(judged)
+    card = card_of(judged, about)
     if judged:
-        draw_rates(rates, folder / "rates.png")
+        draw_rates(card.rates, folder / "rates.png")
         draw_confusion(judged, folder / "confusion.png")
-    if doses:
-        draw_doses(doses, folder / "dose_response.png")
-    (folder / CARD).write_text(_page(judged, rates, doses, about), encoding="utf-8")
+    if card.doses:
+        draw_doses(card.doses, folder / "dose_response.png")
+    (folder / CARD).write_text(_page(card), encoding="utf-8")
     numbers = {
         "about": about,
-        "rates": [{**asdict(r), "interval": r.interval} for r in rates],
+        "rates": [{**asdict(r), "interval": r.interval} for r in card.rates],
         "recordings": [asdict(j) for j in judged],
-        "doses": [asdict(d) for d in doses],
+        "doses": [asdict(d) for d in card.doses],
     }
-    (folder / NUMBERS).write_text(json.dumps(numbers, indent=1), encoding="utf-8")
-    return rates
+    (folder / NUMBERS).write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
+    return list(card.rates)
+
+
+def read_card(file: Path) -> Card:
+    """The card of a file of numbers: counted again from its recordings.
+
+    Raises UserError if the file is absent or something else.
+    """
+    try:
+        numbers = json.loads(file.read_text(encoding="utf-8"))
+        judged = [judged_from(entry) for entry in numbers["recordings"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise UserError(
+            "this is no score card", str(file), "`wind prove open` writes one."
+        ) from None
+    return card_of(judged, numbers["about"])
 
 
 def _doses(judged: Sequence[Judged]) -> list[Dose]:
@@ -52,40 +82,68 @@ def _doses(judged: Sequence[Judged]) -> list[Dose]:
     return [c for c in curves if c is not None]
 
 
-def _page(
-    judged: Sequence[Judged], rates: Sequence[Rate], doses: Sequence[Dose], about: dict[str, Any]
-) -> str:
-    lines = ["# Score card", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [f"- recordings: {len(judged)}", ""]
-    clock, processor = median_seconds(judged)
-    lines += ["| what | rate | 95 % interval | promised | kept |", "|---|---|---|---|---|"]
-    lines += [_rate_row(r) for r in rates]
-    lines += [
+def _page(card: Card) -> str:
+    lines = ["# Score card", "", *about_lines(card), ""]
+    lines += [*rate_lines(card), "", "![rates](rates.png)", "", "## By stratum", ""]
+    lines += [*stratum_lines(card), "", "## What was said of what", ""]
+    lines += ["![confusion matrix](confusion.png)", ""]
+    if card.doses:
+        lines += ["## How large an effect must be", "", *dose_lines(card), ""]
+        lines += ["![dose and response](dose_response.png)", ""]
+    lines += ["## Parameters", "", *coverage_lines(card), ""]
+    lines += ["## Every failure", "", *failure_lines(card)]
+    return "\n".join(lines) + "\n"
+
+
+def about_lines(card: Card) -> list[str]:
+    """What the scores are of, as a list."""
+    lines = [f"- {key}: {value}" for key, value in card.about.items()]
+    return [*lines, f"- recordings: {len(card.judged)}"]
+
+
+def rate_lines(card: Card) -> list[str]:
+    """The promised rates as a table, and how long it took."""
+    clock, processor = median_seconds(card.judged)
+    lines = ["| what | rate | 95 % interval | promised | kept |", "|---|---|---|---|---|"]
+    lines += [_rate_row(r) for r in card.rates]
+    return [
+        *lines,
         "",
-        f"Mean number of names for a finding: {mean_set_size(judged):.2f} (promised below 1.5). "
-        f"Median run time: {clock:.1f} s on the clock, {processor:.1f} s of processors.",
-        "",
-        "![rates](rates.png)",
-        "",
-        "## By stratum",
-        "",
+        f"Mean number of names for a finding: {mean_set_size(card.judged):.2f} (promised below "
+        f"1.5). Median run time: {clock:.1f} s on the clock, {processor:.1f} s of processors.",
+    ]
+
+
+def stratum_lines(card: Card) -> list[str]:
+    """Outcomes by stratum as a table."""
+    lines = [
         "| stratum | cases | " + " | ".join(OUTCOMES) + " |",
         "|---" * (len(OUTCOMES) + 2) + "|",
     ]
-    for stratum in sorted({j.stratum for j in judged}):
-        inside = [j for j in judged if j.stratum == stratum]
+    for stratum in sorted({j.stratum for j in card.judged}):
+        inside = [j for j in card.judged if j.stratum == stratum]
         tally = [sum(j.outcome == o for j in inside) for o in OUTCOMES]
         lines.append(f"| {stratum} | {len(inside)} | " + " | ".join(map(str, tally)) + " |")
-    lines += ["", "## What was said of what", "", "![confusion matrix](confusion.png)", ""]
-    if doses:
-        lines += ["## How large an effect must be", ""]
-        lines += ["| effect | found in half [minima] | found in 90 % [minima] | cases |"]
-        lines += ["|---|---|---|---|"]
-        lines += [_dose_row(d) for d in doses]
-        lines += ["", "![dose and response](dose_response.png)", ""]
-    lines += _failures(judged)
-    return "\n".join(lines) + "\n"
+    return lines
+
+
+def dose_lines(card: Card) -> list[str]:
+    """Sizes found in half and in nine tenths of the cases as a table."""
+    lines = ["| effect | found in half [minima] | found in 90 % [minima] | cases |"]
+    return [*lines, "|---|---|---|---|", *(_dose_row(d) for d in card.doses)]
+
+
+def coverage_lines(card: Card) -> list[str]:
+    """Every parameter that could be compared with what was planted, as a table."""
+    lines = ["| recording | effect | parameter | planted | 95 % interval | holds |"]
+    lines.append("|---|---|---|---|---|---|")
+    lines += [
+        f"| {j.name} | {c.effect} | {c.parameter} | {c.truth:.4g} | {c.low:.4g} to {c.high:.4g} | "
+        f"{'yes' if c.holds else 'no'} |"
+        for j in card.judged
+        for c in j.coverage
+    ]
+    return lines
 
 
 def _rate_row(rate: Rate) -> str:
@@ -127,18 +185,18 @@ def is_failure(judged: Judged) -> bool:
     return not judged.found
 
 
-def _failures(judged: Sequence[Judged]) -> list[str]:
-    failed = [j for j in judged if is_failure(j)]
-    lines = ["## Every failure", "", f"{len(failed)} of {len(judged)} recordings.", ""]
+def failure_lines(card: Card) -> list[str]:
+    """Every failure by name, as a table."""
+    failed = [j for j in card.judged if is_failure(j)]
+    lines = [f"{len(failed)} of {len(card.judged)} recordings.", ""]
     if failed:
         lines += ["| recording | stratum | concealed | size | said |", "|---|---|---|---|---|"]
     for one in sorted(failed, key=lambda j: (j.stratum, j.truth, j.size)):
         truth = " + ".join(one.truth) or "nothing"
         if one.stranger:
             gone = one.stratum == "withheld"
-            truth = (
-                f"{one.stranger} ({'taken out of the catalogue' if gone else 'in no catalogue'})"
-            )
+            where = "taken out of the catalogue" if gone else "in no catalogue"
+            truth = f"{one.stranger} ({where})"
         said = " + ".join([*one.named, *("{" + ", ".join(s) + "}" for s in one.sets)])
         said = f"{one.verdict}: {said}" if said else one.verdict
         size = f"{one.size:g}" if one.size else ""

@@ -36,8 +36,8 @@ class Judged:
     truth: names of the concealed causes ("unknown" for one that is in no catalogue, or was taken
     out of it); stranger: its own name; without: effects taken out of the catalogue; size: of the
     smallest cause in multiples of its minimum; named: certain findings; sets: groups of
-    alternatives; seconds on the clock and of processors; excess_removed [1] on held-out data, or
-    None.
+    alternatives; seconds on the clock and of processors; removed [1] on held-out data, by what
+    was named, and excess_removed the same where it is exact, or None.
     """
 
     name: str
@@ -55,6 +55,7 @@ class Judged:
     processor: float
     memory: float
     excess_removed: float | None
+    removed: float | None
     coverage: tuple[Coverage, ...]
 
     @property
@@ -112,8 +113,24 @@ def judge(
         seconds=float(run["seconds"]) if run else 0.0,
         processor=float(run.get("processor", 0.0)) if run else 0.0,
         memory=float(run["memory"]) if run else 0.0,
-        excess_removed=_excess_removed(diagnosis) if diagnosis and outcome == "exact" else None,
+        excess_removed=excess_removed(diagnosis) if diagnosis and outcome == "exact" else None,
+        removed=excess_removed(diagnosis) if diagnosis else None,
         coverage=covered(causes, diagnosis) if diagnosis and outcome == "exact" else (),
+    )
+
+
+def judged_from(entry: dict[str, Any]) -> Judged:
+    """A recording's outcome as a file of numbers holds it."""
+    return Judged(
+        **{
+            "removed": None,
+            **entry,
+            "truth": tuple(entry["truth"]),
+            "without": tuple(entry.get("without", ())),
+            "named": tuple(entry["named"]),
+            "sets": tuple(tuple(s) for s in entry["sets"]),
+            "coverage": tuple(Coverage(**c) for c in entry["coverage"]),
+        }
     )
 
 
@@ -165,7 +182,8 @@ def _verdict(diagnosis: dict[str, Any] | None, run: dict[str, Any] | None) -> st
     return "refused" if run and run.get("status") == REFUSAL else "failed"
 
 
-def _excess_removed(diagnosis: dict[str, Any]) -> float | None:
+def excess_removed(diagnosis: dict[str, Any]) -> float | None:
+    """Share of the excess misfit that a diagnosis removed on held-out blocks [1]; None: none."""
     shares = [
         float(f["proof"]["excess_removed"])
         for f in diagnosis.get("findings", [])

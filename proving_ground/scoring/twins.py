@@ -6,12 +6,13 @@ one means that the corrected station leaves no more misfit than the twin has wit
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,9 @@ from proving_ground.scoring.rates import LARGE
 from proving_ground.sealing.opening import judge_all, open_sealed
 from proving_ground.sealing.seal import RECORDINGS, draw
 from proving_ground.sealing.trial import RUNS
+from wind_sensors.errors import UserError
 
+FILE = "twins.json"
 CORRECTED = "station_corrected.yaml"
 
 
@@ -93,17 +96,32 @@ def _residual(recording: Path, target: Path, station: Path | None = None) -> Arr
 
 
 def write_removals(folder: Path, found: Sequence[Removal]) -> Path:
-    """Write the table of removals; its path."""
+    """Write the removals as numbers; the path."""
     folder.mkdir(parents=True, exist_ok=True)
+    path = folder / FILE
+    path.write_text(json.dumps([asdict(r) for r in found], indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def read_removals(path: Path) -> list[Removal]:
+    """The removals of a file of numbers. Raises UserError if it is something else."""
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))
+        return [Removal(**{**e, "effects": tuple(e["effects"])}) for e in entries]
+    except (ValueError, TypeError, KeyError):
+        raise UserError(
+            "these are no removals", str(path), "`wind prove twins` writes them."
+        ) from None
+
+
+def twin_lines(found: Sequence[Removal]) -> list[str]:
+    """The removals for people: how many are enough, and a table."""
+    if not found:
+        return ["No exact finding that changes the second's values."]
     shares = [r.share for r in found]
-    lines = ["# Misfit removed, against a twin in which nothing was concealed", ""]
-    if shares:
-        lines.append(
-            f"Median share {np.median(shares):.2f}; at least 0.95 in "
-            f"{sum(s >= 0.95 for s in shares)}"
-            f", at least 0.8 in {sum(s >= 0.8 for s in shares)} of {len(shares)} exact findings."
-        )
-    lines += [
+    lines = [
+        f"Median share {np.median(shares):.2f}; at least 0.95 in {sum(s >= 0.95 for s in shares)}, "
+        f"at least 0.8 in {sum(s >= 0.8 for s in shares)} of {len(shares)} exact findings.",
         "",
         "| recording | effect | before | after | twin | share |",
         "|---|---|---|---|---|---|",
@@ -113,6 +131,4 @@ def write_removals(folder: Path, found: Sequence[Removal]) -> Path:
         f"{r.share:.2f} |"
         for r in sorted(found, key=lambda r: r.share)
     ]
-    page = folder / "twins.md"
-    page.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return page
+    return lines

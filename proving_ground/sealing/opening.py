@@ -11,7 +11,7 @@ from proving_ground.scoring.outcome import Judged, judge
 from proving_ground.scoring.rates import Rate
 from proving_ground.sealing.cipher import commitment, decrypt
 from proving_ground.sealing.seal import ANSWERS
-from proving_ground.sealing.trial import DIAGNOSIS, RUN_FILE, RUNS, read_manifest
+from proving_ground.sealing.trial import DIAGNOSIS, PROGRAM_FILE, RUN_FILE, RUNS, read_manifest
 from wind_sensors.errors import UserError
 
 
@@ -58,6 +58,20 @@ def _load(path: Path) -> dict[str, Any] | None:
     return found
 
 
+def about_set(folder: Path, sealed: dict[str, Any]) -> dict[str, Any]:
+    """What a set is and what diagnosed it, for the head of a page."""
+    answers, drawing = sealed["answers"], sealed["drawing"]
+    return {
+        **(_load(folder / RUNS / PROGRAM_FILE) or {}),
+        "commitment": read_manifest(folder)["commitment"],
+        "seed": drawing["seed"],
+        "sealed": len(answers),
+        "stations": len({a["station"] for a in answers.values()}),
+        "minutes": drawing["minutes"],
+        "healthy recordings of each station": drawing["healthy_count"],
+    }
+
+
 def score(
     folder: Path, key: bytes, output: Path, *, force: bool = False, partial: bool = False
 ) -> list[Rate]:
@@ -77,10 +91,11 @@ def score(
             str(folder),
             "`wind prove run` goes on where it stopped; --partial scores what there is.",
         )
-    answers = open_answers(folder, key)
+    sealed = open_sealed(folder, key)
+    answers = sealed["answers"]
     judged = judge_all(folder, {n: a for n, a in answers.items() if n in said})
     about = {
-        "commitment, checked": manifest["commitment"],
+        **about_set(folder, sealed),
         "not diagnosed": missing,
         "peak memory [MB]": round(max((j.memory for j in judged), default=0.0)),
     }

@@ -18,12 +18,14 @@ from typing import Any
 from rich.progress import track
 
 from proving_ground.sealing.seal import HEALTHY, MANIFEST, RECORDINGS
+from wind_sensors import __version__
 from wind_sensors.errors import UserError
 
 RUNS = "runs"
 RUN_FILE = "run.json"
 LOG_FILE = "diagnose.log"
 DIAGNOSIS = "diagnosis.json"
+PROGRAM_FILE = "program.json"
 BASELINES = "baselines"
 PROGRAM = (sys.executable, "-m", "wind_sensors.cli")
 PASSED_ON = ("PATH", "HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "VIRTUAL_ENV", "PYTHONPATH")
@@ -38,6 +40,26 @@ class Run:
     seconds: float
     processor: float
     memory: float
+
+
+def program_version() -> dict[str, Any]:
+    """What diagnoses: version, the commit of a checkout (with + where files differ from it), the
+    day, and the processors of the machine."""
+    root = Path(__file__).resolve().parents[2]
+
+    def git(*words: str) -> str:
+        done = subprocess.run(
+            ["git", "-C", str(root), *words], capture_output=True, text=True, check=False
+        )
+        return done.stdout.strip() if done.returncode == 0 else ""
+
+    commit = git("rev-parse", "--short", "HEAD") if (root / ".git").exists() else ""
+    changed = "+" if commit and git("status", "--porcelain", "--", "wind_sensors") else ""
+    return {
+        "version": f"{commit}{changed}" or __version__,
+        "day": time.strftime("%Y-%m-%d", time.gmtime()),
+        "processors": os.cpu_count() or 1,
+    }
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -80,6 +102,8 @@ def run_all(
         left_out = [w for effect in entry.get("without", []) for w in ("--without", str(effect))]
         return run_one(folder, name, str(entry["healthy"]), timeout, program, [*left_out, *options])
 
+    (folder / RUNS).mkdir(exist_ok=True)
+    (folder / RUNS / PROGRAM_FILE).write_text(json.dumps(program_version()), encoding="utf-8")
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         list(track(pool.map(learn, stations), "learning baselines", total=len(stations)))
         runs = list(track(pool.map(one, todo), "diagnosing", total=len(todo)))
@@ -115,9 +139,13 @@ def run_one(
     timeout: float,
     program: Sequence[str] = PROGRAM,
     options: Sequence[str] = (),
+    target: Path | None = None,
 ) -> Run:
-    """Diagnose one recording in a folder of its own, with an environment of its own."""
-    target = folder / RUNS / name
+    """Diagnose one recording in a folder of its own, with an environment of its own.
+
+    What is kept goes to `target`; None: among the runs of the set.
+    """
+    target = target or folder / RUNS / name
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="wind-prove-") as place:
         room = Path(place)

@@ -46,6 +46,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     opened.add_argument("--key", required=True, metavar="FILE|HEX")
     opened.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     opened.add_argument("--force", action="store_true", help="write over an earlier score")
+    opened.add_argument("--no-oracle", action="store_true", help="do not fit the true models")
     opened.add_argument("--partial", action="store_true", help="score before all is diagnosed")
 
     peers = steps.add_parser("peers", help="other methods on the recordings of an opened set")
@@ -64,6 +65,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     real.add_argument("--from", dest="local", type=Path, metavar="DIR", help="copies to use")
     real.add_argument("--force", action="store_true", help="replace an earlier page")
 
+    page = steps.add_parser("publish", help="fill a page with the numbers of scored sets")
+    page.add_argument(
+        "folders", type=Path, nargs="*", metavar="SCORE", help="what open, peers, real wrote"
+    )
+    page.add_argument("--page", type=Path, default=Path("docs/proof.md"), metavar="FILE")
+
     demo = steps.add_parser("demo", help="one case from sealing to opening in two minutes")
     demo.add_argument("-o", "--output", type=Path, default=Path("prove_demo"), metavar="DIR")
     demo.add_argument("--seed", type=int, default=7)
@@ -81,6 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         "peers": _peers,
         "twins": _twins,
         "real": _real,
+        "publish": _publish,
         "demo": _demo,
     }
     return steps[arguments.step](arguments)
@@ -146,18 +154,26 @@ def _open(arguments: argparse.Namespace) -> int:
         partial=arguments.partial,
     )
     _print_rates(rates)
+    if not arguments.no_oracle:
+        from proving_ground.scoring.card import NUMBERS, read_card
+        from proving_ground.scoring.oracle import shares, write_shares
+
+        judged = read_card(output / NUMBERS).judged
+        write_shares(output, shares(arguments.folder, judged))
     print(f"wrote {output}")
     return int(any(rate.met is False for rate in rates))
 
 
 def _peers(arguments: argparse.Namespace) -> int:
-    from proving_ground.peers.table import compare, write_table
-    from proving_ground.sealing.opening import judge_all, open_answers
+    from proving_ground.peers.rows import write_table
+    from proving_ground.peers.table import compare
+    from proving_ground.sealing.opening import about_set, judge_all, open_sealed
 
-    answers = open_answers(arguments.folder, _read_key(arguments.key))
-    judged = judge_all(arguments.folder, answers)
-    rows = compare(arguments.folder, answers, judged, arguments.jobs)
-    print(f"wrote {write_table(arguments.output or arguments.folder / 'score', rows)}")
+    sealed = open_sealed(arguments.folder, _read_key(arguments.key))
+    judged = judge_all(arguments.folder, sealed["answers"])
+    rows = compare(arguments.folder, sealed["answers"], judged, arguments.jobs)
+    about = about_set(arguments.folder, sealed)
+    print(f"wrote {write_table(arguments.output or arguments.folder / 'score', rows, about)}")
     return 0
 
 
@@ -180,6 +196,14 @@ def _real(arguments: argparse.Namespace) -> int:
             raise UserError("the folder exists already", str(output), "Add --force to replace it.")
         shutil.rmtree(output)
     print(f"wrote {run_real(output, arguments.local)}")
+    return 0
+
+
+def _publish(arguments: argparse.Namespace) -> int:
+    from proving_ground.publishing.page import publish
+
+    for path in publish(arguments.page, arguments.folders):
+        print(f"wrote {path}")
     return 0
 
 

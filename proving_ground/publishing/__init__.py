@@ -1,0 +1,1 @@
+"""From files of numbers to the page that people read."""
