@@ -39,9 +39,10 @@ CONFUSABLE = (
 ALONE = ("sensor_swap",)
 """Effects that no pair holds: they hide whatever is planted beside them."""
 
-SPECIAL_CASES = ("platform_velocity",)
-"""Effects that another one contains (a velocity scale of nought is a missing velocity): taking
-them out of the catalogue would not make them unknown."""
+SPECIAL_CASES = ("platform_velocity", "air_density", "calibration_drift")
+"""Effects that another one contains: a velocity scale of nought is a missing velocity, thin air of
+one temperature is a heavy rotor, ice without weight is a gain. Without them in the catalogue the
+other one would still be true, so they would not be unknown."""
 
 FIRST_SCORING_STATION = 10_000
 """Stations below are for development; scoring never draws them."""
