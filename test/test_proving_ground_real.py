@@ -11,7 +11,7 @@ import pytest
 from proving_ground.drive import GRID_RATE
 from proving_ground.measure import wrap
 from proving_ground.real.doses import DOSES, read_rows, write_stretch
-from proving_ground.real.page import verdict_line
+from proving_ground.real.page import Row, row_table, verdict_line
 from proving_ground.real.sources import SOURCES, fetch
 from proving_ground.real.turbulence import on_grid, read_sonic
 from proving_ground.scene import build_scene
@@ -96,6 +96,17 @@ def test_a_verdict_is_told_in_one_line() -> None:
     line = verdict_line({"verdict": "named", "findings": [finding]})
     assert line == "named: vane_offset (vane) [offset 3 (2.5 to 3.5) deg]"
     assert verdict_line({"verdict": "none", "findings": []}) == "none"
+
+
+def test_what_was_planted_is_told_beside_what_was_said() -> None:
+    rows = [
+        Row("mast", "vane_offset vane, 8 degrees", "named: icing (cup)", 61.4, "wrong name"),
+        Row("roof", "as it is", "none", 3.0),
+    ]
+    head, _, wrong, free = row_table([vars(row) for row in rows])
+    assert head.count("|") == wrong.count("|") == free.count("|")
+    assert "| wrong name | named: icing (cup) | 61 |" in wrong
+    assert "| as it is |  | none |" in free
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="shared material absent")

@@ -17,6 +17,7 @@ from proving_ground.generate import Planted
 from proving_ground.real.doses import DOSES, STRETCH, read_rows, write_stretch
 from proving_ground.real.sources import SOURCES, Source, fetch
 from proving_ground.real.turbulence import on_grid, read_sonic, record_in
+from proving_ground.scoring.outcome import findings_of, outcome_of
 from proving_ground.stations import random_station
 from wind_sensors.errors import UserError
 
@@ -36,12 +37,14 @@ TURBULENCE_DOSES = (
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the page."""
+    """One line of the page; outcome: what was said against what was planted, empty where nobody
+    knows."""
 
     record: str
     planted: str
     verdict: str
     seconds: float
+    outcome: str = ""
 
 
 def run_real(output: Path, local: Path | None = None) -> Path:
@@ -101,7 +104,10 @@ def _mast_doses(table: Path, output: Path) -> list[Row]:
         if problem:
             found.append(Row("mast, eight weeks", planted, problem, 0.0))
         else:
-            found.append(_diagnosed("mast, eight weeks", planted, recording, [before], output))
+            truth = () if dose.effect == "none" else (dose.effect,)
+            found.append(
+                _diagnosed("mast, eight weeks", planted, recording, [before], output, truth)
+            )
     return found
 
 
@@ -120,7 +126,9 @@ def _turbulence_rows(files: list[Path], output: Path) -> list[Row]:
         folder = place / f"sonic_dose_{number}"
         record_in(station, winds[-1], 100 + number, planted, folder)
         name = ", ".join(f"{p.effect} {p.size_factor:g} x" for p in planted) or "nothing"
-        found.append(_diagnosed("instruments in real turbulence", name, folder, healthy, output))
+        truth = tuple(p.effect for p in planted)
+        record = "instruments in real turbulence"
+        found.append(_diagnosed(record, name, folder, healthy, output, truth))
     return found
 
 
@@ -138,7 +146,12 @@ def _import(files: list[Path], mapping: str, target: Path) -> str:
 
 
 def _diagnosed(
-    record: str, planted: str, recording: Path, healthy: list[Path], output: Path
+    record: str,
+    planted: str,
+    recording: Path,
+    healthy: list[Path],
+    output: Path,
+    truth: tuple[str, ...] | None = None,
 ) -> Row:
     target = output / "diagnoses" / recording.name
     arguments = ["diagnose", str(recording), "-o", str(target)]
@@ -150,7 +163,12 @@ def _diagnosed(
     file = target / "diagnosis.json"
     if done.returncode or not file.exists():
         return Row(record, planted, f"no verdict: {_last_line(done.stderr)}", seconds)
-    return Row(record, planted, verdict_line(json.loads(file.read_text("utf-8"))), seconds)
+    diagnosis = json.loads(file.read_text("utf-8"))
+    line = verdict_line(diagnosis)
+    if truth is None:
+        return Row(record, planted, line, seconds)
+    outcome = outcome_of(truth, str(diagnosis["verdict"]), *findings_of(diagnosis))
+    return Row(record, planted, line, seconds, outcome)
 
 
 def verdict_line(diagnosis: dict[str, Any]) -> str:
@@ -190,7 +208,8 @@ def _page(rows: Sequence[Row], notes: Sequence[str]) -> str:
 
 def row_table(rows: Sequence[dict[str, Any]]) -> list[str]:
     """What was planted into real records and what was said, as a table."""
-    lines = ["| record | planted | verdict | seconds |", "|---|---|---|---|"]
+    lines = ["| record | planted | outcome | verdict | seconds |", "|---|---|---|---|---|"]
     return lines + [
-        f"| {r['record']} | {r['planted']} | {r['verdict']} | {r['seconds']:.0f} |" for r in rows
+        f"| {r['record']} | {r['planted']} | {r['outcome']} | {r['verdict']} | {r['seconds']:.0f} |"
+        for r in rows
     ]
