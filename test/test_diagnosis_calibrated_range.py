@@ -1,0 +1,53 @@
+"""Certificates say what is normal only in the winds of a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration
+from wind_sensors.diagnosis.comparison import Comparison, prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.diagnosis.learning import default_baseline
+from wind_sensors.recordings import load_station
+from wind_sensors.simulation.run import simulate
+from wind_sensors.simulation.scenario import Scenario
+from wind_sensors.station.model import Input, Reference, Station
+from wind_sensors.turbulence.synthesis import TurbulenceSpec
+
+
+def station() -> Station:
+    reference = Reference(topic=Input(topic="/reference/wind"), separation=0.5, path_length=0.15)
+    return load_station("mast_cup_vane").model_copy(update={"reference": reference})
+
+
+def compared(speed: float) -> Comparison:
+    wind = TurbulenceSpec(
+        mean_speed=speed,
+        direction=0.5,
+        standard_deviations=(0.12 * speed, 0.1 * speed, 0.07 * speed),
+        integral_lengths=(40.0, 25.0, 15.0),
+        seed=2,
+    )
+    return prepare(simulate(station(), Scenario(wind=wind, duration=200.0, seed=2)))
+
+
+@pytest.mark.parametrize(("speed", "calm"), [(1.5, True), (3.0, True), (6.0, False)])
+def test_below_the_calibrated_winds_only_healthy_recordings_help(speed: float, calm: bool) -> None:
+    comparison = compared(speed)
+    certificates = default_baseline(station())
+    assert is_too_calm(comparison, certificates) is calm
+    learnt: Baseline = replace(certificates, recordings=("healthy",))
+    assert not is_too_calm(comparison, learnt)
+
+
+def test_a_reading_that_repeats_is_told_in_any_wind() -> None:
+    effects = catalogue()
+    stuck = Term(effects["stuck_sensor"], "vane", {"start": 0.0, "stop": 60.0})
+    slow = Term(effects["calibration_drift"], "cup", {"gain": 0.97})
+    assert not need_calibration([stuck])
+    assert need_calibration([stuck, slow])
+    assert not need_calibration([])
