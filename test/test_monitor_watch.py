@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
 
+from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.learning import learn
 from wind_sensors.diagnosis.watch import Watch, WatchSettings
 from wind_sensors.diagnosis.watch.replaying import replay
 from wind_sensors.diagnosis.watch.sequential import SequentialTest
@@ -136,6 +141,80 @@ def test_sums_pass_their_threshold_as_rarely_as_stated() -> None:
     onset = test.onset()
     assert onset is not None
     assert 14_398 <= onset <= 14_404
+
+
+@lru_cache(maxsize=1)
+def commissioned() -> Baseline:
+    return learn([recorded(station(), 420.0, seed) for seed in (21, 22, 23)])
+
+
+def planted(name: str, values: dict[str, float], interval: tuple[float, float | None]) -> Station:
+    effect = catalogue()[name]
+    instrument = "vane" if name.startswith("vane") else "cup"
+    complete = {p.name: p.healthy or 0.0 for p in effect.parameters} | values
+    return with_effect(station(), effect, instrument, complete, interval)
+
+
+def looked(recording: Recording, executor: Executor | None = None) -> Watch:
+    watch = Watch(station(), WatchSettings(), commissioned(), executor)
+    replay(recording, watch)
+    return watch
+
+
+def test_with_a_baseline_what_was_wrong_from_the_start_is_found() -> None:
+    heavy = planted("rotor_inertia", {"inertia_factor": 2.6}, (0.0, None))
+    recording = recorded(heavy, 460.0)
+    finding = looked(recording).finding
+    assert finding is not None
+    assert (finding.detected - recording.start) * 1e-9 < 440.0
+    assert finding.channel == "cup/rotor_rate"
+    assert finding.candidates[0].effect == "rotor_inertia"
+    assert finding.candidates[0].values["inertia_factor"] == pytest.approx(2.6, rel=0.2)
+
+
+def test_with_a_baseline_a_healthy_quarter_of_an_hour_raises_no_alarm() -> None:
+    watch = looked(recorded(station(), 900.0, seed=5))
+    assert watch.learnt
+    assert watch.finding is None
+    assert not watch.past
+
+
+class Later(Executor):
+    """Runs what it is given when it is asked to, or breaks."""
+
+    def __init__(self) -> None:
+        self.waiting: list[tuple[Future[object], Callable[[], object]]] = []
+
+    def submit(self, fn: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.waiting.append((future, lambda: fn(*arguments, **options)))
+        return future
+
+
+def test_signals_do_not_wait_for_a_look_that_is_taken_beside() -> None:
+    turned = planted("vane_offset", {"offset": 6.0}, (0.0, None))
+    recording = recorded(turned, 460.0)
+    beside = Later()
+    watch = looked(recording, beside)
+    assert watch.blocks == 7
+    assert watch.finding is None
+    ((future, work),) = beside.waiting
+    future.set_result(work())
+    watch.add_wind(recording.stop + 50_000_000, np.array([7.0, 0.0, 0.0]))
+    assert watch.finding is not None
+    assert watch.finding.channel == "vane/vane_angle"
+    assert "vane_offset" in [c.effect for c in watch.finding.candidates]
+
+
+def test_a_process_beside_that_dies_is_done_without() -> None:
+    beside = Later()
+    watch = looked(recorded(station(), 460.0), beside)
+    ((future, _),) = beside.waiting
+    future.set_exception(BrokenExecutor())
+    assert not watch.learnt
+    replay(recorded(station(), 460.0), watch)
+    assert len(beside.waiting) == 1
+    assert watch.learnt
 
 
 def test_settings_that_do_not_fit_are_refused() -> None:

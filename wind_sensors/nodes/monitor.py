@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import signal
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -172,7 +175,10 @@ class MonitorNode(Node):
         settings = self._settings(values)
         if settings.drive != "reference":
             self.reference = None
-        self.watch = Watch(self.station, settings, _baseline(str(values["baseline"])))
+        baseline = _baseline(str(values["baseline"]))
+        # A look at the last minutes takes seconds, in which messages must not be lost.
+        self._beside = None if baseline is None else _process_beside()
+        self.watch = Watch(self.station, settings, baseline, self._beside)
         self._inputs = EstimatorInputs(self.station, self.watch, self._now)
         self._winds = 0
         self._winds_unusable = 0
@@ -195,6 +201,12 @@ class MonitorNode(Node):
             [self._comparison, self._mismatch, self._past, self._estimate, self._inputs.statuses],
             period=_number(values["diagnostics_period"]),
         )
+
+    def destroy_node(self) -> None:
+        """Leave the graph, and end the process beside."""
+        if self._beside is not None:
+            self._beside.shutdown(wait=False, cancel_futures=True)
+        super().destroy_node()
 
     @property
     def received(self) -> int:
@@ -267,7 +279,7 @@ class MonitorNode(Node):
             "blocks compared": str(watch.blocks),
             "blocks left out": str(watch.skipped),
             "left out because": watch.skipped_for,
-            "largest statistic / threshold": f"{watch.alarm_level:.2f}",
+            "nearness of an alarm": f"{watch.alarm_level:.2f}",
             "accepted false alarms": f"{watch.settings.false_alarms_per_day:g} a day",
             "baseline": "healthy recordings" if watch.calibrated else "the first blocks",
         }
@@ -354,6 +366,16 @@ def _baseline(file: str) -> Baseline | None:
         raise UserError(reason, file, remedy) from None
     except ValueError:
         raise UserError("this is not a baseline.", file, remedy) from None
+
+
+def _process_beside() -> ProcessPoolExecutor:
+    """One process that works while this one listens; interrupts are this one's business."""
+    return ProcessPoolExecutor(
+        1,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
 
 
 def _number(value: Value) -> float:

@@ -114,8 +114,20 @@ class SignalStore:
         columns = [np.interp(at, since, velocity[:, k]) for k in range(3)]
         return Winds(grid[inside], np.stack(columns, axis=1))
 
+    def wind(self, start: int, stop: int) -> Winds | None:
+        """The driving wind as it came."""
+        found = self._array(_WIND, start, stop)
+        return None if found is None else Winds(found.time, found.values)
+
     def recording(
-        self, station: Station, session: int, start: int, stop: int, without: Sequence[str] = ()
+        self,
+        station: Station,
+        session: int,
+        start: int,
+        stop: int,
+        without: Sequence[str] = (),
+        *,
+        gridded: bool = True,
     ) -> Recording | None:
         """What arrived between two times as a recording.
 
@@ -124,11 +136,12 @@ class SignalStore:
             session: Time that counts as the recording's start (for changes of the station) [ns].
             start, stop: [ns]
             without: Instruments to leave out.
+            gridded: Whether the wind is interpolated, which takes some of its fastest changes.
 
         Returns:
             The recording, or None without a wind.
         """
-        wind = self.wind_on_grid(start, stop)
+        wind = self.wind_on_grid(start, stop) if gridded else self.wind(start, stop)
         if wind is None:
             return None
         # A rotor that stands still sends nothing, which is a measurement too.

@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import replace
+from concurrent.futures import Executor
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, prepare
-from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.learning import default_baseline
-from wind_sensors.diagnosis.signatures import signature_bank, templates_of
-from wind_sensors.diagnosis.watch.confirming import confirmed
+from wind_sensors.diagnosis.watch.blocks import Block, Judge
+from wind_sensors.diagnosis.watch.by_looks import LooksJudge
+from wind_sensors.diagnosis.watch.by_sums import SumsJudge
 from wind_sensors.diagnosis.watch.direct import Oddity, oddities
-from wind_sensors.diagnosis.watch.evidence import (
-    Evidence,
-    Learning,
-    Registry,
-    Snapshot,
-    channel_excess,
-    departures,
-    standing_amplitudes,
-)
-from wind_sensors.diagnosis.watch.finding import Finding, Located, UsualMisfit, located
-from wind_sensors.diagnosis.watch.naming import candidates, limited
-from wind_sensors.diagnosis.watch.normal import Normal
-from wind_sensors.diagnosis.watch.sequential import SequentialTest
+from wind_sensors.diagnosis.watch.finding import Finding
 from wind_sensors.diagnosis.watch.settings import WatchSettings
 from wind_sensors.diagnosis.watch.store import GRID_STEP, SignalStore
 from wind_sensors.errors import UserError
@@ -36,29 +23,16 @@ from wind_sensors.estimation import EstimatorSettings, make_estimator
 from wind_sensors.estimation.outputs import HealthItem
 from wind_sensors.estimation.streaming import StreamingEstimator
 from wind_sensors.station.model import Station
+from wind_sensors.station.signals import Recording
 
 FloatArray = npt.NDArray[np.float64]
-
-REMEMBERED = 40
-"""Blocks of evidence kept since an onset."""
-
-WHOLE = 4
-"""Newest blocks kept whole, for trying candidates."""
 
 DRIFT_SPAN = 450_000_000_000
 """A drifting clock is taken to have run for so long before a block [ns]."""
 
-RECONSIDERED = 4
-"""The candidates of a lasting mismatch are weighed anew every so many blocks."""
-
-SETTLING = 2
-"""Blocks after the learning in which the session's standing amplitudes still settle."""
-
 _SECOND = 1_000_000_000
 _LEAST_SEEN = 0.6
 _JUMP = 5 * _SECOND
-_LEARN_BELOW = 0.35
-_OVER_BELOW = 0.5
 
 
 class Watch:
@@ -72,21 +46,24 @@ class Watch:
         settings: How to watch.
         baseline: From `wind baseline`; None: normal is learnt from the first blocks, so that only
             what changes after them is found.
+        executor: Where the diagnosis of the last minutes may take its seconds; None: signals wait.
 
     Attributes:
         station: The healthy station that is simulated.
         blocks: Compared so far.
         skipped: Blocks that had too little wind or no signals.
         skipped_for: Why the last of them was left out.
-        finding: The present mismatch, None while there is none.
-        past: The last mismatches that are over.
 
     Raises:
         UserError: The settings do not fit the station.
     """
 
     def __init__(
-        self, station: Station, settings: WatchSettings, baseline: Baseline | None = None
+        self,
+        station: Station,
+        settings: WatchSettings,
+        baseline: Baseline | None = None,
+        executor: Executor | None = None,
     ) -> None:
         known = {i.name for i in station.instruments}
         unknown = [n for n in settings.driving if n not in known]
@@ -97,8 +74,10 @@ class Watch:
                 f"It has {', '.join(sorted(known))}.",
             )
         self.settings = settings
-        self._baseline = default_baseline(station) if baseline is None else baseline
-        self.station = self._baseline.station if self._baseline.calibrated else station
+        known_normal = default_baseline(station) if baseline is None else baseline
+        self._baseline = known_normal.for_station(station)
+        self._stated = station
+        self.station = self._baseline.station
         missing = [c for c in default_baseline(station).channels if c not in
                    self._baseline.channels]  # fmt: skip
         if missing:
@@ -108,18 +87,13 @@ class Watch:
                 "Make one from recordings of this station: `wind baseline HEALTHY... -o FILE`.",
             )
         self._estimator = self._driving_estimator()
-        self._effects = catalogue()
         self._store = SignalStore()
-        self._registry = Registry()
-        self._normal = Normal(self._baseline, series=settings.drive != "estimate")
-        self._learning = Learning()
-        self._usual = UsualMisfit()
-        blocks_per_day = 86400.0 / settings.block
-        self._test = SequentialTest(
-            settings.false_alarms_per_day, blocks_per_day, bounded=self.calibrated
-        )
-        self._evidence: deque[Evidence] = deque(maxlen=REMEMBERED)
-        self._whole: deque[Snapshot] = deque(maxlen=WHOLE)
+        self._judge: Judge
+        if self.calibrated and settings.drive == "reference":
+            block = round(settings.block * _SECOND)
+            self._judge = LooksJudge(self._baseline, self._last_minutes, block, executor)
+        else:
+            self._judge = SumsJudge(self.station, settings, self._baseline)
         self._session: int | None = None
         self._begin = 0
         self._latest_wind = 0
@@ -127,8 +101,6 @@ class Watch:
         self.blocks = 0
         self.skipped = 0
         self.skipped_for = ""
-        self.finding: Finding | None = None
-        self.past: deque[Finding] = deque(maxlen=5)
 
     def _driving_estimator(self) -> StreamingEstimator | None:
         if self.settings.drive == "reference":
@@ -147,17 +119,22 @@ class Watch:
     @property
     def learnt(self) -> bool:
         """Whether normal is known."""
-        return self.blocks >= self._needed
+        return self._judge.learnt
 
     @property
-    def _needed(self) -> int:
-        """With a baseline only the noise of this day has to be learnt."""
-        return min(4, self.settings.learning) if self.calibrated else self.settings.learning
+    def finding(self) -> Finding | None:
+        """The present mismatch, None while there is none."""
+        return self._judge.told.finding
+
+    @property
+    def past(self) -> deque[Finding]:
+        """The last mismatches that are over."""
+        return self._judge.told.past
 
     @property
     def alarm_level(self) -> float:
-        """Largest test statistic relative to its threshold; 1 is an alarm."""
-        return self._test.largest
+        """How near an alarm is; 1 is one."""
+        return self._judge.level
 
     @property
     def latest_wind(self) -> int:
@@ -237,17 +214,20 @@ class Watch:
         elif time > self._latest_wind + block:
             # After a long silence the next block begins with what comes.
             self._begin = time + lead
+            self._judge.restart()
         self._latest_wind = max(self._latest_wind, time)
         self._store.add_wind(time, velocity.tolist())
+        self._judge.poll()
         while time >= self._begin + block + wait:
             self._compare(self._begin, self._begin + block, lead)
             self._begin += block
-            self._store.forget_before(self._begin - lead - 2 * _SECOND)
+            self._store.forget_before(self._begin - self._judge.span - lead - 2 * _SECOND)
 
     def _start_at(self, time: int) -> None:
         """First wind, or a clock that was set back: what was learnt stays."""
         if self._session is not None:
             self._store.clear()
+            self._judge.restart()
         self._session = time
         self._latest_wind = time
         lead = round(self.settings.lead_in * _SECOND)
@@ -263,14 +243,15 @@ class Watch:
         session = self._session
         if not self.station.changes:
             session = max(session, start - DRIFT_SPAN)
+        measured = self._estimator is None
+        known = self._store.wind_on_grid(start - lead, stop)
         recording = self._store.recording(
-            self.station, session, start - lead, stop, self.settings.driving
+            self.station, session, start - lead, stop, self.settings.driving, gridded=not measured
         )
-        if recording is None or recording.reference is None:
+        if known is None or recording is None:
             self._skip("no wind to compare with")
             return None
-        expected = (stop - start) / GRID_STEP
-        if recording.reference.time.size < _LEAST_SEEN * expected:
+        if known.time.size < _LEAST_SEEN * (stop - start) / GRID_STEP:
             self._skip("too little wind to compare with")
             return None
         try:
@@ -291,131 +272,25 @@ class Watch:
             found.append(Oddity("stuck_sensor", name, start, stop, text))
         return found
 
+    def _last_minutes(self, start: int, stop: int) -> Recording | None:
+        session = start
+        if self._stated.changes and self._session is not None:
+            session = self._session
+        return self._store.recording(self._stated, session, start, stop, gridded=False)
+
     def _compare(self, start: int, stop: int, lead: int) -> None:
         comparison = self._prepared(start, stop, lead)
         if comparison is None:
             return
-        number = self.blocks
-        templates = templates_of(comparison, self.station, self._effects)
         try:
-            bank = signature_bank(comparison, self.station, templates)
+            pulses, angles = comparison.signals(self.station)
         except ValueError:
             self._skip("the simulated rotor runs away")
             return
-        places = self._registry.places_of(templates)
-        size = len(self._registry.templates)
-        self._test.resize(size)
-        trust = self._normal.trust(comparison, bank.without)
-        signatures = bank.whitened(comparison, trust)
-        raw = comparison.vector(bank.without, trust)
-        standing = self._standing()[places] @ signatures
-        residual = raw - standing
+        expected = comparison.observe(pulses, angles)
         odd = self._silent(comparison, start, stop)
-        odd += oddities(
-            comparison, bank.without, self.station, *comparison.signals(self.station), start, stop
-        )
-        gram = signatures @ signatures.T
-        evidence = Evidence(
-            number=number,
-            start=start,
-            stop=stop,
-            places=places,
-            gram=gram,
-            seen=signatures @ residual,
-            chi_square=limited(residual),
-            count=residual.size,
-            channels=channel_excess(comparison, trust, residual),
-            speed=float(np.mean(comparison.speed)),
-            direction=float(np.angle(np.mean(np.exp(1j * comparison.wind_from)))),
-        )
-        # Without a baseline the test compares with the session's own beginning, before anything
-        # is taken off.
-        tested = evidence.seen if self.calibrated else signatures @ raw
-        departure, precision = departures(
-            self._registry, evidence, tested, {o.instrument for o in odd}
-        )
-        learning = not self.learnt
-        if not learning:
-            self._test.add(number, departure, precision)
-            self._evidence.append(evidence)
-            self._whole.append(Snapshot(number, comparison, trust, standing, bank.without))
-        if not odd and (learning or self._test.largest < _LEARN_BELOW):
-            self._normal.learn(comparison, bank.without, residual)
-            self._usual.learn(evidence.channels)
-        if not odd:
-            self._test.learn(departure, precision)
-            if number < self._needed + SETTLING:
-                self._test.settle(departure, precision)
-        if learning and not self.calibrated and not odd:
-            self._learning.add(places, gram, signatures @ raw, size)
-        self.blocks += 1
-        self._judge(number, stop, odd, departure, precision)
-
-    def _standing(self) -> FloatArray:
-        if self.calibrated:
-            return standing_amplitudes(self._baseline, self._registry)
-        if not self.learnt:
-            return np.zeros(len(self._registry.templates))
-        return self._learning.amplitudes(self._registry)
-
-    def _judge(
-        self,
-        number: int,
-        stop: int,
-        odd: Sequence[Oddity],
-        departure: FloatArray,
-        precision: FloatArray,
-    ) -> None:
-        if odd:
-            first = min(odd, key=lambda o: o.start)
-            known = self.finding
-            onset = first.start if known is None else min(first.start, known.onset)
-            detected = stop if known is None else known.detected
-            self.finding = Finding.of_oddity(first, onset, detected, stop)
-            return
-        onset_block = self._test.onset()
-        if onset_block is None:
-            over = self.finding is not None and (
-                self.finding.certain or self._test.largest < _OVER_BELOW
-            )
-            if over:
-                self._end(stop - self._block_ns)
-            return
-        since = [e for e in self._evidence if e.number >= onset_block]
-        whole = [s for s in self._whole if s.number >= onset_block]
-        if len(whole) > 2 and whole[0].number == onset_block:
-            # The change happened somewhere within this one.
-            del whole[0]
-        if not since or not whole:
-            return
-        known = self.finding
-        if known is not None and not known.certain and number % RECONSIDERED:
-            named = known.candidates
+        odd += oddities(comparison, expected, self.station, pulses, angles, start, stop)
+        if self._judge.judge(Block(self.blocks, start, stop, comparison, odd)):
+            self.blocks += 1
         else:
-            named = tuple(candidates(self._registry, self.station, since, whole))
-        if (known is None or known.certain) and not confirmed(since, named, self._usual):
-            # A difference that is real but small becomes normal.
-            self._test.settle(departure, precision)
-            if known is not None:
-                self._end(stop - self._block_ns)
-            return
-        where: Located = located(since, self._usual)
-        onset = since[0].start if known is None else min(known.onset, since[0].start)
-        self.finding = Finding(
-            onset=onset,
-            detected=stop if known is None else known.detected,
-            latest=stop,
-            located=where,
-            candidates=named,
-            blocks=len(since),
-        )
-
-    def _end(self, time: int) -> None:
-        """The present mismatch is over."""
-        if self.finding is not None:
-            self.past.append(replace(self.finding, ended=time))
-            self.finding = None
-
-    @property
-    def _block_ns(self) -> int:
-        return round(self.settings.block * _SECOND)
+            self._skip("the simulated rotor runs away")
