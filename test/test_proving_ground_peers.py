@@ -86,7 +86,7 @@ def test_the_comparison_runs_from_regressors_to_the_page(
 ) -> None:
     """A planted signature is named, noise is not, and what is taken out cannot be."""
     monkeypatch.setattr(table, "require_peers", lambda: None)
-    monkeypatch.setattr(table, "METHODS", {"forward": forward_bic})
+    monkeypatch.setattr(table, "METHODS", {"forward": (forward_bic,)})
     effects = np.array(["icing", "vane_offset", "wake_shadow"])
     rng = np.random.default_rng(5)
     planted = {"found": 1, "gone": 1, "well": None}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -79,28 +80,28 @@ def _sindy(optimizer: Any, signatures: Array, residual: Array) -> Array:
     return np.asarray(fitted.coef_).reshape(-1)
 
 
-def stlsq(signatures: Array, residual: Array) -> Array:
+def stlsq(signatures: Array, residual: Array, threshold: float = 0.05) -> Array:
     """Sequentially thresholded least squares of pysindy."""
     import pysindy
 
-    return _sindy(pysindy.STLSQ(threshold=0.05, alpha=0.05), signatures, residual)
+    return _sindy(pysindy.STLSQ(threshold=threshold, alpha=0.05), signatures, residual)
 
 
-def sr3(signatures: Array, residual: Array) -> Array:
+def sr3(signatures: Array, residual: Array, weight: float = 0.005) -> Array:
     """Sparse relaxed regularised regression of pysindy."""
     import pysindy
 
-    optimizer = pysindy.SR3(reg_weight_lam=0.005, regularizer="L0", relax_coeff_nu=1.0)
+    optimizer = pysindy.SR3(reg_weight_lam=weight, regularizer="L0", relax_coeff_nu=1.0)
     return _sindy(optimizer, signatures, residual)
 
 
-def ensemble(signatures: Array, residual: Array) -> Array:
+def ensemble(signatures: Array, residual: Array, threshold: float = 0.05) -> Array:
     """Bagged STLSQ: the median of models of pysindy on resampled rows."""
     rng = np.random.default_rng(0)
     drawn = []
     for _ in range(MODELS):
         rows = rng.integers(0, residual.size, residual.size)
-        drawn.append(stlsq(signatures[rows], residual[rows]))
+        drawn.append(stlsq(signatures[rows], residual[rows], threshold))
     return np.asarray(np.median(drawn, axis=0))
 
 
@@ -126,11 +127,12 @@ def frols(signatures: Array, residual: Array) -> Array:
     return least_squares(signatures, residual, order[: int(np.argmin(scores))])
 
 
-METHODS: dict[str, Method] = {
-    "STLSQ (pysindy)": stlsq,
-    "ensemble STLSQ (pysindy)": ensemble,
-    "SR3 (pysindy)": sr3,
-    "FROLS (sysidentpy)": frols,
-    "LASSO, cross-validated (scikit-learn)": lasso,
-    "forward selection by BIC": forward_bic,
+METHODS: dict[str, tuple[Method, ...]] = {
+    "STLSQ (pysindy)": (stlsq, partial(stlsq, threshold=0.2)),
+    "ensemble STLSQ (pysindy)": (ensemble, partial(ensemble, threshold=0.2)),
+    "SR3 (pysindy)": (sr3, partial(sr3, weight=0.05)),
+    "FROLS (sysidentpy)": (frols,),
+    "LASSO, cross-validated (scikit-learn)": (lasso,),
+    "forward selection by BIC": (forward_bic,),
 }
+"""Every method with its settings; it is judged by the setting that suits it best."""

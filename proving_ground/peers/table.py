@@ -16,7 +16,7 @@ import numpy as np
 from rich.progress import track
 
 from proving_ground.inflow import Array
-from proving_ground.peers.methods import METHODS, require_peers
+from proving_ground.peers.methods import METHODS, Method, require_peers
 from proving_ground.peers.rows import PeerScore
 from proving_ground.scoring.outcome import NAMES_SOMETHING, UNKNOWN, Judged
 from proving_ground.scoring.rates import LARGE
@@ -105,8 +105,8 @@ def autoregression(signal: Array) -> Array:
 
 
 def importances(
-    path: Path, methods: Sequence[str], whitened: bool, without: Sequence[str] = ()
-) -> dict[str, Importance]:
+    path: Path, methods: Sequence[Method], whitened: bool, without: Sequence[str] = ()
+) -> list[Importance]:
     """Share of the residual's deviation that each effect explains, for each method.
 
     The signatures of effects `without` are left out, as they are for the diagnosis.
@@ -120,33 +120,29 @@ def importances(
         residual, signatures = whiten(residual, signatures, channel)
     scale = signatures.std(axis=0)
     seen = (scale > 1e-9) & ~np.isin(effects, list(without))
-    columns = signatures[:, seen] / scale[seen]
+    columns, names = signatures[:, seen] / scale[seen], effects[seen]
     size = float(np.sqrt(np.mean(residual**2)))
-    found = {}
+    found = []
     for method in methods:
-        coefficients = METHODS[method](columns, residual / size)
+        coefficients = method(columns, residual / size)
         parts = {
-            str(name): float(
-                np.sqrt(
-                    np.mean(
-                        (columns[:, effects[seen] == name] @ coefficients[effects[seen] == name])
-                        ** 2
-                    )
-                )
-            )
-            for name in np.unique(effects[seen])
+            str(name): columns[:, names == name] @ coefficients[names == name]
+            for name in np.unique(names)
         }
-        found[method] = {name: part for name, part in parts.items() if part > 0.0}
+        sizes = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items()}
+        found.append({name: value for name, value in sizes.items() if value > 0.0})
     return found
 
 
-def _timed(item: tuple[Path, bool, Sequence[str]]) -> dict[str, tuple[Importance, float]]:
+def _timed(
+    item: tuple[Path, bool, Sequence[str]],
+) -> dict[str, tuple[list[Importance], float]]:
     path, whitened, without = item
     found = {}
-    for method in METHODS:
+    for name, settings in METHODS.items():
         begun = time.process_time()
-        importance = importances(path, [method], whitened, without)[method]
-        found[method] = (importance, time.process_time() - begun)
+        importance = importances(path, settings, whitened, without)
+        found[name] = (importance, (time.process_time() - begun) / len(settings))
     return found
 
 
@@ -183,33 +179,50 @@ def compare(
         paths = sorted((folder / REGRESSORS).glob("*.npz"))
         done = _each(_timed, [(p, whitened, _without(manifest, p)) for p in paths], jobs)
         results = dict(zip(paths, track(done, "peers", total=len(paths)), strict=True))
-        for method in METHODS:
-            by_name = {p.stem: results[p][method][0] for p in paths}
-            seconds = float(np.median([results[p][method][1] for p in paths]))
-            groups: dict[str, list[Importance]] = {}
-            for stem, found in by_name.items():
-                if stem.startswith("station-"):
-                    groups.setdefault(stem.rsplit("-healthy", 1)[0], []).append(found)
+        for method, settings in METHODS.items():
             label = f"{method}{', whitened' if whitened else ''}"
-            alarms = rows[0].false_alarms[0]
-            tried = []
-            for floor in FLOORS:
-                over = {
-                    name: excess(by_name[name], groups[manifest[name]["healthy"]], floor)
-                    for name in answers
-                    if name in by_name
-                }
-                limits = (
-                    threshold(list(groups.values()), floor),
-                    limit_with(over, answers, alarms),
+            seconds = float(np.median([results[p][method][1] for p in paths]))
+            tried = [
+                row
+                for number in range(len(settings))
+                for row in _rows_of(
+                    label,
+                    {p.stem: results[p][method][0][number] for p in paths},
+                    manifest,
+                    answers,
+                    rows[0].false_alarms[0],
+                    seconds,
                 )
-                row, matched = (
-                    peer_row(label, names_above(over, limit), answers, seconds) for limit in limits
-                )
-                tried.append(replace(row, matched=matched.exact))
+            ]
             best = max(tried, key=lambda r: (r.exact[0], r.included[0], -r.wrong[0]))
             rows.append(replace(best, matched=max(r.matched for r in tried)))
     return rows
+
+
+def _rows_of(
+    label: str,
+    by_name: Mapping[str, Importance],
+    manifest: dict[str, Any],
+    answers: dict[str, Any],
+    alarms: int,
+    seconds: float,
+) -> Iterator[PeerScore]:
+    """The rows of one setting of a method, one for each floor."""
+    groups: dict[str, list[Importance]] = {}
+    for stem, found in by_name.items():
+        if stem.startswith("station-"):
+            groups.setdefault(stem.rsplit("-healthy", 1)[0], []).append(found)
+    for floor in FLOORS:
+        over = {
+            name: excess(by_name[name], groups[manifest[name]["healthy"]], floor)
+            for name in answers
+            if name in by_name
+        }
+        limits = threshold(list(groups.values()), floor), limit_with(over, answers, alarms)
+        row, matched = (
+            peer_row(label, names_above(over, limit), answers, seconds) for limit in limits
+        )
+        yield replace(row, matched=matched.exact)
 
 
 def names_above(over: Mapping[str, Importance], limit: float) -> dict[str, set[str]]:

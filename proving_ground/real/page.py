@@ -59,11 +59,11 @@ def run_real(output: Path, local: Path | None = None) -> Path:
             files = fetch(source, output / "files" / source.mapping, local)
         except UserError as problem:
             notes.append(str(problem))
-            say(f"   {problem}")
+            say(f"   {problem}", markup=False)
             continue
         for found in _rows_of(source, files, output):
             rows.append(found)
-            say(f"   {found.record}, {found.planted}: {found.verdict}")
+            say(f"   {found.record}, {found.planted}: {found.verdict}", markup=False)
     page = output / "real.md"
     page.write_text(_page(rows, notes), encoding="utf-8")
     numbers = json.dumps([vars(r) for r in rows], indent=1)
