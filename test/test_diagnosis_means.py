@@ -14,8 +14,9 @@ import pytest
 
 from wind_sensors.diagnosis.counts import compare_pair, count_statistics
 from wind_sensors.diagnosis.fitting import ALWAYS
-from wind_sensors.diagnosis.means.averages import indicated_speed
-from wind_sensors.diagnosis.means.diagnose import diagnose_means, learn_means
+from wind_sensors.diagnosis.means.averages import averages_of, indicated_speed, joined
+from wind_sensors.diagnosis.means.diagnose import diagnose_means
+from wind_sensors.diagnosis.means.healthy import learn_means
 from wind_sensors.diagnosis.means.mean_response import mean_speed
 from wind_sensors.errors import UserError
 from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
@@ -373,3 +374,30 @@ def test_friction_follows_the_temperature_only_where_held_out_blocks_say_so(stif
         assert estimates["temperature_coefficient"].value == pytest.approx(-0.05, abs=0.015)
     else:
         assert "temperature_coefficient" not in estimates
+
+
+def test_one_healthy_recording_is_enough_and_its_limits_are_told() -> None:
+    station, time, values = made(13)
+    _, _, before = made(113, 600)
+    values["two_a"] = np.maximum(values["two_a"] - 4.0 / values["two_a"], 0.0)
+    normal = learn_means([(recorded(station, time[:600], before), {})])
+    outcome = diagnose_means(recorded(station, time, values), {}, normal)
+    assert ("bearing_friction", "two_a") in [f.term.key for f in outcome.findings]
+    assert any("one recording of 4 days" in note for note in outcome.declined)
+    assert any("directions and speeds" in note for note in outcome.declined)
+
+
+def test_several_healthy_recordings_are_one_with_gaps() -> None:
+    station, time, values = made(20, 900)
+    rows = (slice(0, 300), slice(600, 900))
+    parts = []
+    for chosen in rows:
+        some = {name: column[chosen] for name, column in values.items()}
+        parts.append(averages_of(recorded(station, time[chosen], some)))
+    whole = averages_of(recorded(station, time, values))
+    both = joined([parts[1], parts[0]])
+    _, here, there = np.intersect1d(both.time, whole.time, return_indices=True)
+    assert here.size == len(both) == 598
+    assert both.speed["one_a"] == pytest.approx(whole.speed["one_a"][there])
+    assert both.heading["vane_b"] == pytest.approx(whole.heading["vane_b"][there])
+    assert np.diff(both.elapsed).max() == pytest.approx(302 * 600.0)

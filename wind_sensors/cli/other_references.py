@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.progress import Progress, TaskID
 
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
-from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means, learn_means
+from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
+from wind_sensors.diagnosis.means.healthy import learn_means
 from wind_sensors.diagnosis.outcome import Outcome
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording, read_series

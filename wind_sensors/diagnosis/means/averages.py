@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,6 +149,40 @@ def part(averages: Averages, rows: BoolArray | npt.NDArray[np.intp]) -> Averages
         deviation={k: v[rows] for k, v in averages.deviation.items()},
         temperature=averages.temperature[rows],
         density=averages.density[rows],
+    )
+
+
+def joined(several: Sequence[Averages]) -> Averages:
+    """Recordings of one station as one, in the order of time.
+
+    Instruments that are missing in one of them are NaN there; of means with the same stamp the
+    first counts.
+    """
+    if len(several) == 1:
+        return several[0]
+    time, row = np.unique(np.concatenate([a.time for a in several]), return_index=True)
+
+    def column(parts: Sequence[FloatArray | None]) -> FloatArray:
+        filled = [
+            np.full(len(a), np.nan) if p is None else p
+            for a, p in zip(several, parts, strict=True)
+        ]
+        return np.asarray(np.concatenate(filled)[row])
+
+    def columns(tables: Sequence[Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
+        names = dict.fromkeys(name for table in tables for name in table)
+        return {name: column([table.get(name) for table in tables]) for name in names}
+
+    return Averages(
+        station=several[0].station,
+        time=time,
+        elapsed=np.asarray((time - time[0]) * 1e-9, dtype=np.float64),
+        interval=several[0].interval,
+        speed=columns([a.speed for a in several]),
+        heading=columns([a.heading for a in several]),
+        deviation=columns([a.deviation for a in several]),
+        temperature=column([a.temperature for a in several]),
+        density=column([a.density for a in several]),
     )
 
 

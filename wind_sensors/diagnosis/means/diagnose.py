@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means import panels, silences
-from wind_sensors.diagnosis.means.averages import Averages, averages_of
+from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import bench_of
 from wind_sensors.diagnosis.means.culprit import likelihood_of_first
 from wind_sensors.diagnosis.means.findings import (
@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.means.findings import (
     findings_of_vane,
 )
 from wind_sensors.diagnosis.means.fits import intervals
+from wind_sensors.diagnosis.means.healthy import Healthy, cleaned
 from wind_sensors.diagnosis.means.pair import (
     cells,
     direction_of,
@@ -46,9 +47,6 @@ from wind_sensors.station.signals import Recording, Series
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-WORKING = 0.5
-"""Share of its means that a vane must deliver to be compared with healthy ones."""
-
 DECISIVE = 3.0
 """The other heights decide between two rotors when the log-likelihoods differ by so much."""
 
@@ -59,69 +57,9 @@ REMAINDER_SHARE = 0.35
 """Share of a pair's misfit above which a remainder makes the cause unknown."""
 
 
-@dataclass(frozen=True)
-class Healthy:
-    """What healthy recordings of means tell.
-
-    Attributes:
-        names: Of the recordings.
-        averages: Their means, without silences.
-        pairs: Rotors that are each other's reference.
-    """
-
-    names: tuple[str, ...]
-    averages: Averages
-    pairs: tuple[tuple[str, str], ...]
-
-
 def is_of_means(recording: Recording) -> bool:
     """Whether a recording holds means instead of signals."""
     return recording.station.recording.averaging_time > 0.0
-
-
-def _clean(
-    recording: Recording, deviations: Mapping[str, Series] | None
-) -> tuple[Averages, Averages, list[silences.Silence]]:
-    raw = averages_of(recording, deviations)
-    silent = silences.silences(raw)
-    return raw, silences.without_silences(raw, silent), silent
-
-
-def learn_means(
-    recordings: Sequence[tuple[Recording, Mapping[str, Series]]],
-) -> Healthy | None:
-    """What is normal in healthy recordings of means; None: there are none.
-
-    Raises:
-        UserError: A recording has too few means.
-    """
-    if not recordings:
-        return None
-    if len(recordings) > 1:
-        raise UserError(
-            "several healthy recordings of means are given.",
-            "",
-            "Import the healthy weeks as one recording.",
-        )
-    recording, deviations = recordings[0]
-    _, clean, _ = _clean(recording, deviations)
-    return Healthy((recording.name,), clean, tuple(pairs_of(clean)))
-
-
-def _same_vanes(healthy: Healthy, averages: Averages) -> tuple[Healthy, Averages]:
-    """Both with the vanes that work in both: a direction must mean the same before and after."""
-
-    def working(means: Averages) -> set[str]:
-        return {n for n, v in means.heading.items() if np.mean(np.isfinite(v)) > WORKING}
-
-    common = working(healthy.averages) & working(averages)
-    if not common:
-        return healthy, averages
-    one, two = (
-        replace(a, heading={n: v for n, v in a.heading.items() if n in common})
-        for a in (healthy.averages, averages)
-    )
-    return replace(healthy, averages=one), two
 
 
 def diagnose_means(
@@ -148,12 +86,13 @@ def diagnose_means(
         if progress:
             progress(phase, share)
 
-    _, averages, silent = _clean(recording, deviations)
+    averages, silent = cleaned(recording, deviations)
     findings: list[Finding] = [finding_of_silence(averages, s) for s in silent]
     declined: list[str] = []
     pairs = pairs_of(averages) if healthy is None else list(healthy.pairs)
     if healthy is not None:
-        healthy, averages = _same_vanes(healthy, averages)
+        healthy, averages = healthy.of_same_vanes(averages)
+        declined += healthy.reservations(averages)
     for pair_names in list(pairs):
         both = (averages,) if healthy is None else (averages, healthy.averages)
         if not all(is_comparable(a, *pair_names) for a in both):

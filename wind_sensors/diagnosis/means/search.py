@@ -182,7 +182,8 @@ def is_normal(healthy: Bench) -> Callable[[Term], bool]:
     The same effect is fitted to each third of the healthy record, after the record's standing
     difference has been taken out.
     """
-    third = healthy.block * HEALTHY_PARTS // healthy.blocks
+    parts = min(HEALTHY_PARTS, healthy.blocks)
+    third = healthy.block * parts // healthy.blocks
     sizes: dict[tuple[str, str], float] = {}
 
     def normal(term: Term) -> bool:
@@ -190,7 +191,7 @@ def is_normal(healthy: Bench) -> Callable[[Term], bool]:
             start = replace(term, interval=ALWAYS)
             found = [
                 fit(healthy, (), (start,), third == k, 4)[0].relative_size
-                for k in range(HEALTHY_PARTS)
+                for k in range(parts)
             ]
             sizes[term.key] = max(found)
         return term.relative_size < HEALTHY_FACTOR * sizes[term.key]
