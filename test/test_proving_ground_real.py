@@ -95,6 +95,15 @@ def test_a_verdict_is_told_in_one_line() -> None:
     }
     line = verdict_line({"verdict": "named", "findings": [finding]})
     assert line == "named: vane_offset (vane) [offset 3 (2.5 to 3.5) deg]"
+    stuck = {"start": {"value": 5.2e7, "low": 5.2e7, "high": 5.2e7, "unit": "s"}}
+    gain = {"gain": {"value": 0.969, "low": 0.968, "high": 0.97, "unit": "1"}}
+    findings = [
+        {"effect": "stuck_sensor", "instrument": "cup", "parameters": stuck},
+        {"effect": "calibration_drift", "instrument": "cup", "parameters": gain},
+    ]
+    line = verdict_line({"verdict": "named", "findings": findings})
+    assert "start 601.85 (601.85 to 601.85) d" in line
+    assert line.endswith("[gain 0.969 (0.968 to 0.97)]")
     assert verdict_line({"verdict": "none", "findings": []}) == "none"
 
 

@@ -25,6 +25,7 @@ NUMBERS = "real.json"
 STATION_SEED = 20_001
 ADDED_WIND = 4.0
 LONGEST = 900.0
+DAY = 86400.0
 TURBULENCE_DOSES = (
     (),
     (Planted("rotor_inertia", 4.0),),
@@ -172,11 +173,11 @@ def _diagnosed(
 
 
 def verdict_line(diagnosis: dict[str, Any]) -> str:
-    """A verdict with its findings in one line."""
+    """A verdict with its findings in one line; times of more than a day in days."""
     parts = []
     for finding in diagnosis.get("findings", []):
         values = [
-            f"{name} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g}) {p.get('unit', '')}"
+            f"{name} {_estimate(p)}"
             for name, p in finding.get("parameters", {}).items()
             if None not in (p.get("value"), p.get("low"), p.get("high"))
         ]
@@ -184,6 +185,16 @@ def verdict_line(diagnosis: dict[str, Any]) -> str:
         parts.append(f"{finding['effect']} ({finding.get('instrument', '')}){known}")
     text = str(diagnosis["verdict"])
     return f"{text}: {', '.join(parts)}" if parts else text
+
+
+def _estimate(parameter: dict[str, Any]) -> str:
+    value, low, high = (float(parameter[key]) for key in ("value", "low", "high"))
+    unit = str(parameter.get("unit", ""))
+    digits = ".3g"
+    if unit == "s" and abs(value) >= DAY:
+        value, low, high, unit, digits = value / DAY, low / DAY, high / DAY, "d", ".2f"
+    interval = f"{low:{digits}} to {high:{digits}}"
+    return f"{value:{digits}} ({interval}){'' if unit == '1' else ' ' + unit}"
 
 
 def _last_line(text: str) -> str:
