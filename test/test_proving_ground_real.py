@@ -11,10 +11,11 @@ import pytest
 from proving_ground.drive import GRID_RATE
 from proving_ground.measure import wrap
 from proving_ground.real.doses import DOSES, read_rows, write_stretch
-from proving_ground.real.page import Row, row_table, verdict_line
+from proving_ground.real.page import Row, row_table
 from proving_ground.real.sources import SOURCES, fetch
 from proving_ground.real.turbulence import on_grid, read_sonic
 from proving_ground.scene import build_scene
+from proving_ground.scoring.wording import answer_line, verdict_line
 from proving_ground.stations import random_station
 from proving_ground.weather import Weather
 from wind_sensors.errors import UserError
@@ -105,6 +106,14 @@ def test_a_verdict_is_told_in_one_line() -> None:
     assert "start 601.85 (601.85 to 601.85) d" in line
     assert line.endswith("[gain 0.969 (0.968 to 0.97)]")
     assert verdict_line({"verdict": "none", "findings": []}) == "none"
+
+
+def test_an_answer_is_told_in_one_line() -> None:
+    cause = {"effect": "axis_tilt", "instrument": "station", "size_factor": 4.0, "tilt_deg": 24.0}
+    line = answer_line(cause)
+    assert line == "axis_tilt (station), 4 times the smallest size worth reporting: tilt deg 24.0"
+    bird = {"effect": "unknown", "stranger": "bird", "instrument": "vane", "size_factor": 2.0}
+    assert answer_line(bird).startswith("bird (vane), 2 times")
 
 
 def test_what_was_planted_is_told_beside_what_was_said() -> None:

@@ -18,6 +18,7 @@ from proving_ground.real.doses import DOSES, STRETCH, read_rows, write_stretch
 from proving_ground.real.sources import SOURCES, Source, fetch
 from proving_ground.real.turbulence import on_grid, read_sonic, record_in
 from proving_ground.scoring.outcome import findings_of, outcome_of
+from proving_ground.scoring.wording import verdict_line
 from proving_ground.stations import random_station
 from wind_sensors.errors import UserError
 
@@ -25,7 +26,6 @@ NUMBERS = "real.json"
 STATION_SEED = 20_001
 ADDED_WIND = 4.0
 LONGEST = 900.0
-DAY = 86400.0
 TURBULENCE_DOSES = (
     (),
     (Planted("rotor_inertia", 4.0),),
@@ -170,31 +170,6 @@ def _diagnosed(
         return Row(record, planted, line, seconds)
     outcome = outcome_of(truth, str(diagnosis["verdict"]), *findings_of(diagnosis))
     return Row(record, planted, line, seconds, outcome)
-
-
-def verdict_line(diagnosis: dict[str, Any]) -> str:
-    """A verdict with its findings in one line; times of more than a day in days."""
-    parts = []
-    for finding in diagnosis.get("findings", []):
-        values = [
-            f"{name} {_estimate(p)}"
-            for name, p in finding.get("parameters", {}).items()
-            if None not in (p.get("value"), p.get("low"), p.get("high"))
-        ]
-        known = f" [{'; '.join(values)}]" if values else ""
-        parts.append(f"{finding['effect']} ({finding.get('instrument', '')}){known}")
-    text = str(diagnosis["verdict"])
-    return f"{text}: {', '.join(parts)}" if parts else text
-
-
-def _estimate(parameter: dict[str, Any]) -> str:
-    value, low, high = (float(parameter[key]) for key in ("value", "low", "high"))
-    unit = str(parameter.get("unit", ""))
-    digits = ".3g"
-    if unit == "s" and abs(value) >= DAY:
-        value, low, high, unit, digits = value / DAY, low / DAY, high / DAY, "d", ".2f"
-    interval = f"{low:{digits}} to {high:{digits}}"
-    return f"{value:{digits}} ({interval}){'' if unit == '1' else ' ' + unit}"
 
 
 def _last_line(text: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -42,25 +43,31 @@ class Share:
         return self.removed / self.oracle
 
 
-def shares(folder: Path, judged: Sequence[Judged], timeout: float = 300.0) -> list[Share]:
+def shares(
+    folder: Path, judged: Sequence[Judged], jobs: int = 1, timeout: float = 300.0
+) -> list[Share]:
     """The share of every recording with effects of the catalogue at three minima or more.
 
     Recordings in which the true model itself cannot be fitted have none.
     """
     asked = [j for j in judged if j.truth and UNKNOWN not in j.truth and j.size >= LARGE]
     entries = read_manifest(folder)["recordings"]
-    found = []
-    for one in track(asked, "oracle"):
+
+    def fit_truth(one: Judged) -> float | None:
         target = folder / RUNS / one.name
         if not (target / DIAGNOSIS).is_file():
             others = [w for n in MINIMUM_SIZES if n not in one.truth for w in ("--without", n)]
             station = str(entries[one.name]["healthy"])
             run_one(folder, one.name, station, timeout, options=others, target=target)
-        best = _removed(target / DIAGNOSIS)
-        if best is not None and best > 0.0:
-            own = one.removed if one.removed is not None else 0.0
-            found.append(Share(one.name, one.truth, one.outcome, own, best))
-    return found
+        return _removed(target / DIAGNOSIS)
+
+    with ThreadPoolExecutor(max(1, jobs)) as pool:
+        best = list(track(pool.map(fit_truth, asked), "oracle", total=len(asked)))
+    return [
+        Share(one.name, one.truth, one.outcome, one.removed or 0.0, removed)
+        for one, removed in zip(asked, best, strict=True)
+        if removed is not None and removed > 0.0
+    ]
 
 
 def _removed(path: Path) -> float | None:

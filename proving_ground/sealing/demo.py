@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from proving_ground.scoring.wording import answer_line, verdict_line
 from proving_ground.sealing.cipher import new_key
 from proving_ground.sealing.opening import open_answers, score
 from proving_ground.sealing.seal import RECORDINGS, seal
@@ -52,13 +53,11 @@ def play(folder: Path, seed: int, *, force: bool = False) -> None:
             "the diagnosis left no verdict", str(diagnosis.parent), "Its log says what happened."
         )
     verdict = json.loads(diagnosis.read_text(encoding="utf-8"))
-    names = [finding["effect"] for finding in verdict.get("findings", [])]
-    say(f"   verdict: [bold]{verdict['verdict']}[/bold] {', '.join(names)}")
+    say(f"   {verdict_line(verdict)}", markup=False)
     say("[bold]3. Open[/bold] with the key, after checking the commitment.")
     answer = open_answers(folder, key)[name]
     for cause in answer["causes"]:
-        details = {k: v for k, v in cause.items() if k not in ("effect", "instrument")}
-        say(f"   concealed: [bold]{cause['effect']}[/bold] in the {cause['instrument']}, {details}")
+        say(f"   concealed: {answer_line(cause)}", markup=False)
     score(folder, key, folder / "score")
     say(f"   report: {diagnosis.with_name('report.html')}")
     say(f"   {time.monotonic() - begun:.0f} s from sealing to opening")

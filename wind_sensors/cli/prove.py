@@ -46,6 +46,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     opened.add_argument("--key", required=True, metavar="FILE|HEX")
     opened.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     opened.add_argument("--force", action="store_true", help="write over an earlier score")
+    opened.add_argument("--jobs", type=_positive, default=1, help="of the oracle")
     opened.add_argument("--no-oracle", action="store_true", help="do not fit the true models")
     opened.add_argument("--partial", action="store_true", help="score before all is diagnosed")
 
@@ -159,7 +160,7 @@ def _open(arguments: argparse.Namespace) -> int:
         from proving_ground.scoring.oracle import shares, write_shares
 
         judged = read_card(output / NUMBERS).judged
-        write_shares(output, shares(arguments.folder, judged))
+        write_shares(output, shares(arguments.folder, judged, arguments.jobs))
     print(f"wrote {output}")
     return int(any(rate.met is False for rate in rates))
 
