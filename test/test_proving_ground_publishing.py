@@ -9,12 +9,14 @@ from typing import Any
 
 import pytest
 
+from proving_ground.minimum_sizes import MINIMUM_SIZES
 from proving_ground.publishing.blocks import blocks
 from proving_ground.publishing.page import filled, publish
 from proving_ground.scoring import oracle
 from proving_ground.scoring.card import read_card, write_card
 from proving_ground.scoring.oracle import oracle_lines, read_shares, shares, write_shares
 from proving_ground.scoring.outcome import Judged, judge
+from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.errors import UserError
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -89,6 +91,10 @@ def test_a_page_that_asks_for_what_nobody_counts_is_told_so(tmp_path: Path) -> N
     (tmp_path / "page.md").write_text(PAGE)
     with pytest.raises(UserError, match="no numbers"):
         publish(tmp_path / "page.md", [tmp_path])
+
+
+def test_everything_but_the_truth_can_be_taken_out_of_the_catalogue() -> None:
+    assert set(MINIMUM_SIZES) == set(catalogue())
 
 
 def test_the_oracle_fits_the_truth_alone_and_weighs_what_was_said_against_it(
