@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proving_ground.peers import table
+from proving_ground.peers import regress, table
 from proving_ground.peers.methods import forward_bic
+from proving_ground.peers.regress import autoregression, whiten
 from proving_ground.peers.rows import FILE, read_rows, write_table
-from proving_ground.peers.table import autoregression, excess, peer_row, threshold, whiten
+from proving_ground.peers.table import excess, peer_row, threshold
 
 
 def test_forward_selection_finds_the_columns_that_made_the_residual() -> None:
@@ -85,8 +86,9 @@ def test_the_comparison_runs_from_regressors_to_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A planted signature is named, noise is not, and what is taken out cannot be."""
-    monkeypatch.setattr(table, "require_peers", lambda: None)
-    monkeypatch.setattr(table, "METHODS", {"forward": (forward_bic,)})
+    monkeypatch.setattr(regress, "require_peers", lambda: None)
+    for module in (regress, table):
+        monkeypatch.setattr(module, "METHODS", {"forward": (forward_bic,)})
     effects = np.array(["icing", "vane_offset", "wake_shadow"])
     rng = np.random.default_rng(5)
     planted = {"found": 1, "gone": 1, "well": None}
@@ -101,7 +103,7 @@ def test_the_comparison_runs_from_regressors_to_the_page(
         if column is not None:
             residual += 3.0 * signatures[:, column]
         np.savez(
-            table.regressor_file(tmp_path, place), residual=residual, signatures=signatures,
+            regress.regressor_file(tmp_path, place), residual=residual, signatures=signatures,
             effects=effects, sizes=np.ones(3), channel=np.zeros(600, dtype=int),
         )  # fmt: skip
     cause = {"effect": "vane_offset", "size_factor": 3.0}
@@ -113,6 +115,7 @@ def test_the_comparison_runs_from_regressors_to_the_page(
     entries = {n: {"healthy": "station-1", "without": a["without"]} for n, a in answers.items()}
     (tmp_path / "manifest.json").write_text(json.dumps({"recordings": entries}))
     rows = table.compare(tmp_path, answers, [])
+    assert rows[1:] == table.compare(tmp_path, answers, [])[1:], "what was kept is what was found"
     assert [r.method for r in rows] == ["wind diagnose", "forward", "forward, whitened"]
     for row in rows[1:]:
         assert (row.exact, row.false_alarms, row.unknown_named) == ((1, 1), (0, 1), (0, 1))

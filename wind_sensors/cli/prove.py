@@ -52,7 +52,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
     peers = steps.add_parser("peers", help="other methods on the recordings of an opened set")
     peers.add_argument("folder", type=Path, metavar="DIR")
-    peers.add_argument("--key", required=True, metavar="FILE|HEX")
+    peers.add_argument("--key", metavar="FILE|HEX", help="without it, all but the counting is done")
     peers.add_argument("-o", "--output", type=Path, metavar="OUT", help="default DIR/score")
     peers.add_argument("--jobs", type=_positive, default=1)
 
@@ -170,6 +170,12 @@ def _peers(arguments: argparse.Namespace) -> int:
     from proving_ground.peers.table import compare
     from proving_ground.sealing.opening import about_set, judge_all, open_sealed
 
+    if arguments.key is None:
+        from proving_ground.peers.regress import regress_all
+
+        said = regress_all(arguments.folder, arguments.jobs)
+        print(f"the peers have judged {len(said[False])} recordings; --key counts")
+        return 0
     sealed = open_sealed(arguments.folder, _read_key(arguments.key))
     judged = judge_all(arguments.folder, sealed["answers"])
     rows = compare(arguments.folder, sealed["answers"], judged, arguments.jobs)
