@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.learning import learn
-from wind_sensors.diagnosis.watch import Watch, WatchSettings
+from wind_sensors.diagnosis.watch import Watch, WatchSettings, store
 from wind_sensors.diagnosis.watch.replaying import replay
 from wind_sensors.diagnosis.watch.sequential import SequentialTest
 from wind_sensors.errors import UserError
@@ -177,6 +177,20 @@ def test_with_a_baseline_a_healthy_quarter_of_an_hour_raises_no_alarm() -> None:
     assert watch.learnt
     assert watch.finding is None
     assert not watch.past
+
+
+def test_a_look_begins_where_the_store_still_holds_everything(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(store, "MOST_SAMPLES", 50)
+    kept = store.SignalStore()
+    for k in range(80):
+        kept.add_pulse("cup", k * 10)
+        if k % 4 == 0:
+            kept.add_angle("vane", k * 10, 0.0)
+    assert kept.complete_since == 300
+    kept.clear()
+    assert kept.complete_since == 0
 
 
 class Later(Executor):

@@ -87,7 +87,8 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         "false_alarms_per_day",
         float,
         _DEFAULTS.false_alarms_per_day,
-        "Accepted false alarms in a day of data.",
+        "Accepted false alarms in a day of data, where sums over blocks decide: without a "
+        "baseline, or without a reference.",
         minimum=1e-4,
         maximum=10.0,
     ),
@@ -177,7 +178,8 @@ class MonitorNode(Node):
             self.reference = None
         baseline = _baseline(str(values["baseline"]))
         # A look at the last minutes takes seconds, in which messages must not be lost.
-        self._beside = None if baseline is None else _process_beside()
+        looks = baseline is not None and settings.drive == "reference"
+        self._beside = _process_beside() if looks else None
         self.watch = Watch(self.station, settings, baseline, self._beside)
         self._inputs = EstimatorInputs(self.station, self.watch, self._now)
         self._winds = 0
@@ -280,7 +282,7 @@ class MonitorNode(Node):
             "blocks left out": str(watch.skipped),
             "left out because": watch.skipped_for,
             "nearness of an alarm": f"{watch.alarm_level:.2f}",
-            "accepted false alarms": f"{watch.settings.false_alarms_per_day:g} a day",
+            "judged by": self._judged_by(),
             "baseline": "healthy recordings" if watch.calibrated else "the first blocks",
         }
         if watch.latest_wind == 0:
@@ -298,6 +300,12 @@ class MonitorNode(Node):
             agreed = watch.finding is None
             text = "Signals agree with their simulation." if agreed else "Signals are compared."
             yield Status("comparison", Level.OK, text, values)
+
+    def _judged_by(self) -> str:
+        watch = self.watch
+        if watch.looks:
+            return "diagnoses of the last ten minutes"
+        return f"sums over blocks, {watch.settings.false_alarms_per_day:g} false alarms a day"
 
     def _compared_with(self) -> str:
         if self.reference is not None:

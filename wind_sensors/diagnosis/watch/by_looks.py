@@ -118,9 +118,9 @@ class LooksJudge:
         if recording is None:
             return
         if self._executor is None:
-            self._weigh(look(recording, self._baseline, start))
+            self._weigh(look(recording, self._baseline))
         else:
-            self._pending = self._executor.submit(look, recording, self._baseline, start)
+            self._pending = self._executor.submit(look, recording, self._baseline)
 
     def poll(self) -> None:
         """Take in a look that was taken elsewhere and is ready."""

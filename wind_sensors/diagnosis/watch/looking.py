@@ -50,14 +50,15 @@ class Look:
     candidates: tuple[Candidate, ...] = ()
 
 
-def look(recording: Recording, baseline: Baseline, start: int) -> Look:
+def look(recording: Recording, baseline: Baseline) -> Look:
     """Diagnose the last minutes.
 
     Args:
-        recording: Of them.
+        recording: Of them, with a reference.
         baseline: From healthy recordings.
-        start: Where the minutes begin [ns]; the recording may count its time from earlier.
     """
+    # A recording of a station that changes counts its time from the beginning of the session.
+    start = recording.start if recording.reference is None else int(recording.reference.time[0])
     nothing = Look(start, recording.stop)
     try:
         diagnosis = diagnose(recording, baseline, with_proof=False)

@@ -22,7 +22,7 @@ from wind_sensors.station.signals import (
 
 FloatArray = npt.NDArray[np.float64]
 
-MOST_SAMPLES = 100_000
+MOST_SAMPLES = 300_000
 """Of each signal; the oldest give way."""
 
 GRID_STEP = 50_000_000
@@ -79,6 +79,12 @@ class SignalStore:
         for samples in self._samples.values():
             while len(samples) > 1 and samples[1][0] < time:
                 samples.popleft()
+
+    @property
+    def complete_since(self) -> int:
+        """Time before which samples had to give way [ns]; 0 if none had to."""
+        full = (s for s in self._samples.values() if len(s) == MOST_SAMPLES)
+        return max((int(samples[0][0]) for samples in full), default=0)
 
     def clear(self) -> None:
         """Drop everything."""

@@ -89,7 +89,7 @@ class Watch:
         self._estimator = self._driving_estimator()
         self._store = SignalStore()
         self._judge: Judge
-        if self.calibrated and settings.drive == "reference":
+        if self.looks:
             block = round(settings.block * _SECOND)
             self._judge = LooksJudge(self._baseline, self._last_minutes, block, executor)
         else:
@@ -115,6 +115,11 @@ class Watch:
     def calibrated(self) -> bool:
         """Whether a baseline from healthy recordings stands behind the comparison."""
         return self._baseline.calibrated
+
+    @property
+    def looks(self) -> bool:
+        """Whether the last minutes are diagnosed as a whole; else sums over blocks decide."""
+        return self.calibrated and self.settings.drive == "reference"
 
     @property
     def learnt(self) -> bool:
@@ -273,6 +278,7 @@ class Watch:
         return found
 
     def _last_minutes(self, start: int, stop: int) -> Recording | None:
+        start = max(start, self._store.complete_since)
         session = start
         if self._stated.changes and self._session is not None:
             session = self._session
