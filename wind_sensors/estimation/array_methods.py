@@ -13,8 +13,9 @@ from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, o
 from wind_sensors.estimation.forward import AIR_DENSITY, MOUNT_ROTATION
 from wind_sensors.estimation.history import RotorTrack
 from wind_sensors.estimation.intake import Block
-from wind_sensors.estimation.inverse import GAUSSIAN_WIDTH, ScaleFollower, rotor_motion
+from wind_sensors.estimation.inverse import GAUSSIAN_WIDTH, rotor_motion
 from wind_sensors.estimation.outputs import HealthItem, HealthLevel
+from wind_sensors.estimation.scale_follower import ScaleFollower
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.instruments.friction_propeller import FrictionPropeller
 from wind_sensors.instruments.propeller_array import ArrayEstimate, solve, uncorrected_velocity
@@ -56,11 +57,20 @@ def array_estimates(
 class _ArrayCore:
     """What both methods share: the propellers' edges and their axes."""
 
-    def __init__(self, station: Station, settings: EstimatorSettings, seconds: float) -> None:
+    def __init__(
+        self,
+        station: Station,
+        settings: EstimatorSettings,
+        origin: int,
+        seconds: float,
+        restored: bool,
+    ) -> None:
         self._settings = settings
         self._propellers = fixed_propellers_of(station)
         self._axes = array_axes(self._propellers)
-        self._tracks = [RotorTrack(p) for p in self._propellers]
+        self._tracks = [
+            RotorTrack(p.name, station, origin, restored) for p in self._propellers
+        ]
         self._source = CircumstanceSource(station, settings.use_air)
         self._keep = round(seconds * 1e9)
 
@@ -77,10 +87,11 @@ class NaiveArrayCore(_ArrayCore):
     Args:
         station: The station.
         settings: Settings.
+        origin: Start of the recording [ns].
     """
 
-    def __init__(self, station: Station, settings: EstimatorSettings) -> None:
-        super().__init__(station, settings, 2.0)
+    def __init__(self, station: Station, settings: EstimatorSettings, origin: int) -> None:
+        super().__init__(station, settings, origin, 2.0, restored=False)
 
     def process(self, block: Block) -> Estimates:
         """Take a block; its estimates."""
@@ -111,11 +122,12 @@ class InverseArrayCore(_ArrayCore):
     Args:
         station: The station.
         settings: Settings; `bandwidth` is the half-power frequency of the local fits.
+        origin: Start of the recording [ns].
     """
 
-    def __init__(self, station: Station, settings: EstimatorSettings) -> None:
+    def __init__(self, station: Station, settings: EstimatorSettings, origin: int) -> None:
         width = GAUSSIAN_WIDTH / settings.bandwidth
-        super().__init__(station, settings, 4.0 * _REACH * width + 4.0)
+        super().__init__(station, settings, origin, 4.0 * _REACH * width + 4.0, restored=True)
         self._width = width
         self._reach = round(_REACH * width * 1e9)
         self._scales = ScaleFollower(settings)

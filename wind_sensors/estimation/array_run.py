@@ -41,7 +41,7 @@ class ArrayRunCounter:
     def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
         self._propellers = fixed_propellers_of(station)
         self._columns = np.asarray(np.linalg.pinv(array_axes(self._propellers)), dtype=np.float64)
-        self._tracks = [RotorTrack(p) for p in self._propellers]
+        self._tracks = [RotorTrack(p.name, station, start) for p in self._propellers]
         self._angle: list[float | None] = [None] * len(self._propellers)
         self._source = CircumstanceSource(station, use_air)
         self._start = start

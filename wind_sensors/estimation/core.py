@@ -73,19 +73,22 @@ def no_estimates() -> Estimates:
     )
 
 
+def part_of(estimates: Estimates, where: slice | npt.NDArray[np.bool_]) -> Estimates:
+    """Some of the estimates."""
+    return Estimates(
+        estimates.time[where],
+        estimates.velocity[where],
+        estimates.covariance[where],
+        estimates.apparent[where],
+        estimates.apparent_covariance[where],
+        estimates.to_earth[where],
+    )
+
+
 def trusted(estimates: Estimates) -> Estimates:
     """The estimates whose covariance is known: the others would be guesswork."""
-    known = np.isfinite(estimates.covariance).all(axis=(1, 2))
-    if known.all():
-        return estimates
-    return Estimates(
-        estimates.time[known],
-        estimates.velocity[known],
-        estimates.covariance[known],
-        estimates.apparent[known],
-        estimates.apparent_covariance[known],
-        estimates.to_earth[known],
-    )
+    known = np.asarray(np.isfinite(estimates.covariance).all(axis=(1, 2)))
+    return estimates if known.all() else part_of(estimates, known)
 
 
 def joined(parts: list[Estimates]) -> Estimates:

@@ -62,16 +62,52 @@ def correct(
 
 @compiled
 def correct_by_reading(f: FilterState, s: Instruments, ring: Ring, slot: int, v: int, angle: float,
-                       extra_variance: float) -> None:  # fmt: skip
-    """A vane's reading, already turned into a heading of the nose [rad]."""
+                       half_width: float) -> None:  # fmt: skip
+    """A vane's reading, already turned into a heading of the nose [rad].
+
+    With a half width the nose is only known to be within so much of the heading.
+    """
     rotors = s.rotor.shape[0]
     measured = WIND_STATES + 2 * (rotors + v)
     innovation = angle - f.mean[measured]
     innovation -= 2.0 * math.pi * math.floor((innovation + math.pi) / (2.0 * math.pi))
-    squared = correct(f, ring, slot, measured, innovation, f.reading_variance[v] + extra_variance)
-    ring.kind[slot] = READING if extra_variance == 0.0 else -READING
     ring.which[slot] = v
+    if half_width > 0.0:
+        _correct_by_range(f, ring, slot, measured, innovation, half_width, f.reading_variance[v])
+        ring.kind[slot] = -READING
+        return
+    squared = correct(f, ring, slot, measured, innovation, f.reading_variance[v])
+    ring.kind[slot] = READING
     _note(f, rotors + v, squared)
+
+
+@compiled
+def _correct_by_range(
+    f: FilterState, ring: Ring, slot: int, measured: int, middle: float, reach: float, noise: float
+) -> None:
+    """A state lies within `reach` of its mean plus `middle`, limits as unsharp as a reading.
+
+    Mean and variance of the truncated normal distribution, by an equivalent measurement.
+    """
+    prior = f.covariance[measured, measured]
+    blurred = prior + noise
+    deviation = math.sqrt(blurred)
+    low, high = (middle - reach) / deviation, (middle + reach) / deviation
+    if low > 4.0 or high < -4.0:
+        variance = noise + reach * reach / 3.0
+        correct(f, ring, slot, measured, middle, variance)
+        return
+    root = math.sqrt(2.0)
+    inside = 0.5 * (math.erfc(low / root) - math.erfc(high / root))
+    share = 1.0 / (math.sqrt(2.0 * math.pi) * max(inside, 1e-6))
+    at_low, at_high = share * math.exp(-0.5 * low * low), share * math.exp(-0.5 * high * high)
+    shift = at_low - at_high
+    left = 1.0 + low * at_low - high * at_high - shift * shift
+    # Of the state itself: what the limits say reaches it by its part in the blurred variance.
+    gained = min(max((1.0 - left) * prior / blurred, 1e-6), 0.9999)
+    variance = prior * (1.0 - gained) / gained
+    moved = shift * prior / deviation
+    correct(f, ring, slot, measured, moved * (prior + variance) / prior, variance)
 
 
 @compiled
@@ -86,9 +122,9 @@ def _note(f: FilterState, which: int, squared: float) -> None:
 
 @compiled
 def correct_by_edge(
-    f: FilterState, s: Instruments, ring: Ring, slot: int, r: int, time: int
+    f: FilterState, s: Instruments, ring: Ring, slot: int, r: int, time: int, counted: bool
 ) -> None:
-    """An edge of rotor r at a time [ns], the number of lost edges resolved.
+    """An edge of rotor r at a time [ns], the number of lost edges resolved unless it is counted.
 
     Edges were lost (or came extra) when the filter says so and the interval has grown (or shrunk)
     as much: no rotor changes so quickly by itself.
@@ -105,20 +141,8 @@ def correct_by_edge(
         f.last_used[r] = time
         f.slot_interval[r] = 0.0
         return
-    lost = -math.floor(off + 0.5)
     interval = (time - f.last_used[r]) * 1e-9 / f.stride[r]
-    even = (1.0 + 0.5 * lost / f.stride[r]) * f.slot_interval[r]
-    if (lost > 0 and interval < even) or (lost < 0 and interval > even):
-        lost = 0
-    if f.slot_interval[r] == 0.0:
-        lost = 0
-    if lost != 0:
-        # An edge too many or too few is rare: the evidence must outweigh that.
-        share = (f.tally[r, 1] + f.tally[r, 2] + 0.5) / (f.tally[r, 0] + 1.0)
-        doubt = min(max(-math.log(share), 1.0), _RARE)
-        gained = 0.5 * (off * off - (off + lost) * (off + lost))
-        if gained < doubt * (spread * spread + f.edge_variance[r]):
-            lost = 0
+    lost = 0 if counted else _lost_or_extra(f, r, off, spread, interval)
     if lost != 0:
         number += lost
         f.edge_count[r] = number
@@ -139,6 +163,33 @@ def correct_by_edge(
     ring.which[slot] = r
     ring.slot[slot] = place
     _note(f, r, squared)
+
+
+@compiled
+def _lost_or_extra(
+    f: FilterState, r: int, off: float, spread: float, interval: float
+) -> int:
+    """Lost (positive) or extra (negative) edges of rotor r that the evidence speaks for.
+
+    Args:
+        f, r: Filter, rotor.
+        off: Edge expected minus angle believed [slots].
+        spread: Uncertainty of the latter [slots].
+        interval: Since the last edge used, for each of the stride [s].
+    """
+    lost = int(-math.floor(off + 0.5))
+    if f.slot_interval[r] == 0.0 or lost == 0:
+        return 0
+    even = (1.0 + 0.5 * lost / f.stride[r]) * f.slot_interval[r]
+    if (lost > 0 and interval < even) or (lost < 0 and interval > even):
+        return 0
+    # An edge too many or too few is rare: the evidence must outweigh that.
+    share = (f.tally[r, 1] + f.tally[r, 2] + 0.5) / (f.tally[r, 0] + 1.0)
+    doubt = min(max(-math.log(share), 1.0), _RARE)
+    gained = 0.5 * (off * off - (off + lost) * (off + lost))
+    if gained < doubt * (spread * spread + f.edge_variance[r]):
+        return 0
+    return lost
 
 
 @compiled

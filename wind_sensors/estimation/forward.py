@@ -25,6 +25,9 @@ FloatArray = npt.NDArray[np.float64]
 
 CUP, ON_VANE, FIXED_AXIS = 0, 1, 2
 
+CREEP = 0.05
+"""A nose that turns faster than this certainly moves against its friction [rad/s]."""
+
 MOUNT_VELOCITY = 0
 MOUNT_ROTATION = 3
 MOUNT_YAW_RATE = 12
@@ -87,9 +90,23 @@ def rotor_of(s: Instruments, i: int) -> RotorParameters:
 
 
 @compiled
+def vane_with_friction(s: Instruments, i: int) -> VaneParameters:
+    """Constants of vane i."""
+    v = s.vane[i]
+    return VaneParameters(v[0], v[1], v[2], v[3], v[4], v[5], v[6])
+
+
+@compiled
+def grip_of(s: Instruments, i: int) -> float:
+    """Angular acceleration that the friction of vane i can withstand [rad/s^2]."""
+    length = s.vane[i, 0]
+    return float(s.vane[i, 4] / (length * length * s.vane[i, 2]))
+
+
+@compiled
 def vane_of(s: Instruments, i: int) -> VaneParameters:
-    """Constants of vane i, its friction left to the filter's noise: a vane that sticks has no slope
-    that a filter could follow."""
+    """Constants of vane i without friction: a vane that sticks has no slope that a filter could
+    follow. It is added smoothly, and what it withstands at rest is left to the filter's noise."""
     v = s.vane[i]
     return VaneParameters(v[0], v[1], v[2], v[3], 0.0, v[5], v[6])
 
@@ -105,6 +122,18 @@ def apparent(wind: FloatArray, c: FloatArray) -> tuple[float, float, float]:
         c[4] * e + c[7] * n + c[10] * u,
         c[5] * e + c[8] * n + c[11] * u,
     )
+
+
+@compiled
+def turning(c: FloatArray) -> tuple[float, float, float]:
+    """Angular rate of the mount in sensor axes [rad/s]."""
+    return c[MOUNT_ROLL_RATE], c[MOUNT_PITCH_RATE], c[MOUNT_YAW_RATE]
+
+
+@compiled
+def gravity(c: FloatArray) -> tuple[float, float, float]:
+    """Gravity minus the mount's acceleration in sensor axes [m/s^2]."""
+    return c[MOUNT_GRAVITY_X], c[MOUNT_GRAVITY_Y], c[MOUNT_GRAVITY_Z]
 
 
 @compiled
@@ -137,6 +166,15 @@ def at_instrument(
             math.cos(turn) * x - math.sin(turn) * y,
             math.sin(turn) * x + math.cos(turn) * y,
         )
+    return leant(s, which, (x, y, z))
+
+
+@compiled
+def leant(
+    s: Instruments, which: int, vector: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """A vector in sensor axes as the axes of an instrument show it."""
+    x, y, z = vector
     m = s.lean[which]
     return (
         m[0, 0] * x + m[1, 0] * y + m[2, 0] * z,
@@ -193,9 +231,14 @@ def advance_station(
         j = 2 * (rotors + v)
         here_0 = at_instrument(s, rotors + v, felt_0)
         here_1 = at_instrument(s, rotors + v, felt_1)
-        x_0, y_0, turn_0 = here_0[0], here_0[1], c_0[MOUNT_YAW_RATE]
-        x_1, y_1, turn_1 = here_1[0], here_1[1], c_1[MOUNT_YAW_RATE]
-        pull_x, pull_y = c_1[MOUNT_GRAVITY_X], c_1[MOUNT_GRAVITY_Y]
+        turning_0, turning_1, pull = turning(c_0), turning(c_1), gravity(c_1)
+        if s.plain[rotors + v] == 0:
+            turning_0 = leant(s, rotors + v, turning_0)
+            turning_1 = leant(s, rotors + v, turning_1)
+            pull = leant(s, rotors + v, pull)
+        x_0, y_0, turn_0 = here_0[0], here_0[1], turning_0[2]
+        x_1, y_1, turn_1 = here_1[0], here_1[1], turning_1[2]
+        pull_x, pull_y = pull[0], pull[1]
         if s.azimuth[v] >= 0:
             # In the vertical plane through the nose: along it, and downwards across it.
             a = 2 * (rotors + s.azimuth[v])
@@ -203,15 +246,15 @@ def advance_station(
             cos_1, sin_1 = math.cos(out[a]), math.sin(out[a])
             x_0, y_0 = x_0 * cos_0 + y_0 * sin_0, -here_0[2]
             x_1, y_1 = x_1 * cos_1 + y_1 * sin_1, -here_1[2]
-            turn_0 = c_0[MOUNT_PITCH_RATE] * cos_0 - c_0[MOUNT_ROLL_RATE] * sin_0
-            turn_1 = c_1[MOUNT_PITCH_RATE] * cos_1 - c_1[MOUNT_ROLL_RATE] * sin_1
-            pull_x, pull_y = pull_x * cos_1 + pull_y * sin_1, -c_1[MOUNT_GRAVITY_Z]
+            turn_0 = turning_0[1] * cos_0 - turning_0[0] * sin_0
+            turn_1 = turning_1[1] * cos_1 - turning_1[0] * sin_1
+            pull_x, pull_y = pull_x * cos_1 + pull_y * sin_1, -pull[2]
         phi, rate = advance_vane(
             vane_of(s, v), state[j], state[j + 1], (x_0, x_1), (y_0, y_1), (turn_0, turn_1),
             (pull_x, pull_y), c_1[AIR_DENSITY] / s.vane_density[v], dt,
         )  # fmt: skip
         out[j] = phi
-        out[j + 1] = rate
+        out[j + 1] = rate / (1.0 + dt * grip_of(s, v) / (abs(rate) + CREEP))
     for i in range(rotors):
         phi_0 = rate_0 = phi_1 = rate_1 = 0.0
         if int(s.mounting[i, 0]) == ON_VANE:
@@ -295,6 +338,11 @@ def advance_with_jacobian(
             else:
                 by_wind_1[j, which - 3] = (tried[2, j] - tried[1, j]) / (2.0 * reach[which - 3])
     for i in range(rotors):
+        # Where friction stops a rotor its equation has a step, and a difference across it no bound;
+        # two rotors in one wind only come closer.
+        by_state[2 * i, 2 * i] = min(max(by_state[2 * i, 2 * i], 0.0), 1.0)
+        furthest = dt / s.rotor[i, 1]
+        by_state[2 * i + 1, 2 * i] = min(max(by_state[2 * i + 1, 2 * i], 0.0), furthest)
         if s.rotor[i, 13] == 0.0:
             for j in range(count):
                 by_state[j, 2 * i + 1] = 0.0

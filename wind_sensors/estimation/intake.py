@@ -123,6 +123,7 @@ class Intake:
         self.origin: int | None = None
         self.released = 0
         self._earliest = 0
+        self._zero = 0
         self._seen = False
         self._early: list[tuple[str, int, tuple[float, ...]]] = []
         self._astray: list[tuple[str, int, tuple[float, ...]]] = []
@@ -138,38 +139,46 @@ class Intake:
         self._early.clear()
         self._astray.clear()
 
-    def add(self, name: str, time: int, value: tuple[float, ...]) -> bool:
+    def add(self, name: str, stamp: int, value: tuple[float, ...]) -> bool:
         """Take a message; True: the clock has jumped, finish and `restart`."""
-        if self._seen:
-            ahead = time - self.watermark
-            if ahead < -self._jump or ahead > _FAR_AHEAD_NS:
-                return self._is_jump(name, time, value)
-            self._astray.clear()
-            if ahead > 0:
-                self.watermark = time
-        else:
+        if not self._seen:
             self._seen = True
-            self.watermark = self._earliest = time
-        self._keep(name, time, value)
+            self._zero = stamp
+            self.watermark = self._earliest = self._true(name, stamp)
+        time = self._true(name, stamp)
+        ahead = time - self.watermark
+        if ahead < -self._jump or ahead > _FAR_AHEAD_NS:
+            return self._is_jump(name, stamp, value)
+        self._astray.clear()
+        if ahead > 0:
+            self.watermark = time
+        self._keep(name, stamp, value)
         return False
+
+    def _true(self, name: str, stamp: int) -> int:
+        """Time of measurement by a stamp; a drift counts from the first message."""
+        correction = self._corrections.get(name)
+        return stamp if correction is None else correction(stamp, self._zero)
 
     def advance(self, time: int) -> None:
         """Time has passed although no message came."""
         if self._seen and time > self.watermark and time - self.watermark < _FAR_AHEAD_NS:
             self.watermark = time
 
-    def _is_jump(self, name: str, time: int, value: tuple[float, ...]) -> bool:
-        if self._astray and abs(time - self._astray[-1][1]) > self._jump:
-            self._astray.clear()
-        self._astray.append((name, time, value))
+    def _is_jump(self, name: str, stamp: int, value: tuple[float, ...]) -> bool:
+        if self._astray:
+            before, last, _ = self._astray[-1]
+            if abs(self._true(name, stamp) - self._true(before, last)) > self._jump:
+                self._astray.clear()
+        self._astray.append((name, stamp, value))
         if len(self._astray) < _CONFIRMED:
-            self._count_stray(name, time, 1)
+            self._count_stray(name, stamp, 1)
             return False
         self.jumps += 1
         return True
 
-    def _count_stray(self, name: str, time: int, change: int) -> None:
-        if time < self.watermark:
+    def _count_stray(self, name: str, stamp: int, change: int) -> None:
+        if self._true(name, stamp) < self.watermark:
             self.records[name].late += change
         else:
             self.far_ahead += change
@@ -177,21 +186,19 @@ class Intake:
     def restart(self) -> None:
         """After a jump: forget, and begin with the messages that proved it."""
         proof = list(self._astray)
-        for name, time, _ in proof[:-1]:
-            self._count_stray(name, time, -1)
+        for name, stamp, _ in proof[:-1]:
+            self._count_stray(name, stamp, -1)
         self.forget()
-        for name, time, value in proof:
-            self.add(name, time, value)
+        for name, stamp, value in proof:
+            self.add(name, stamp, value)
 
-    def _keep(self, name: str, time: int, value: tuple[float, ...]) -> None:
+    def _keep(self, name: str, stamp: int, value: tuple[float, ...]) -> None:
+        time = self._true(name, stamp)
         if self.origin is None:
-            self._early.append((name, time, value))
+            self._early.append((name, stamp, value))
             self._earliest = min(self._earliest, time)
             return
         record = self.records[name]
-        correction = self._corrections.get(name)
-        if correction is not None:
-            time = correction(time, self.origin)
         if time < self.released:
             record.late += 1
             return
@@ -213,15 +220,12 @@ class Intake:
             start = self._earliest
             if not finish and self.watermark < start + self._wait:
                 return []
-            self.origin = start
             early, self._early = self._early, []
-            corrected = [
-                self._corrections[n](t, start) if n in self._corrections else t
-                for n, t, _ in early
-            ]
-            self.released = min(corrected) // self._block * self._block
-            for name, time, value in early:
-                self._keep(name, time, value)
+            self._zero = min(stamp for _, stamp, _ in early)
+            self.origin = self._zero = min(self._true(name, stamp) for name, stamp, _ in early)
+            self.released = self.origin // self._block * self._block
+            for name, stamp, value in early:
+                self._keep(name, stamp, value)
         out = []
         while self._is_complete(self.released + self._block, wait, finish):
             out.append(self._release(self.released + self._block))

@@ -16,7 +16,14 @@ from wind_sensors.estimation.constants import (
     measures_vertical,
     rotors_of,
 )
-from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
+from wind_sensors.estimation.core import (
+    Estimates,
+    SmallScales,
+    joined,
+    no_estimates,
+    output_times,
+    part_of,
+)
 from wind_sensors.estimation.filter_state import (
     EDGE,
     LARGEST_SLOTS,
@@ -29,22 +36,25 @@ from wind_sensors.estimation.filter_state import (
     empty_ring,
     larger_ring,
 )
-from wind_sensors.estimation.intake import Block
+from wind_sensors.estimation.history import RotorTrack
+from wind_sensors.estimation.intake import Block, Series
 from wind_sensors.estimation.kalman_health import kalman_health
 from wind_sensors.estimation.kalman_kernel import run
 from wind_sensors.estimation.outputs import HealthItem
 from wind_sensors.estimation.propeller_watch import PropellerWatch
-from wind_sensors.estimation.readings import headings
+from wind_sensors.estimation.readings import NoseReader
 from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.site import with_site_covariance
 from wind_sensors.estimation.smoother_kernel import smooth
 from wind_sensors.estimation.start import start_filter
+from wind_sensors.estimation.timeline import Timeline
 from wind_sensors.estimation.turbulence_process import (
     UNRESOLVED_VARIANCE,
     VERTICAL_LEVEL,
     WIND_STATES,
 )
+from wind_sensors.estimation.turn_counting import loses_edges
 from wind_sensors.estimation.wind_state import wind_of
-from wind_sensors.station.changes import Segment, segments
 from wind_sensors.station.model import Cup, Propeller, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -72,7 +82,12 @@ class Events(NamedTuple):
 
 
 def useful_stride(rotor: Cup | Propeller) -> int:
-    """Every how many edges one is used: a divisor of the slots, so that the same edges serve."""
+    """Every how many edges one is used: a divisor of the slots, so that the same edges serve.
+
+    Where edges are known to get lost, each one is used.
+    """
+    if loses_edges(rotor):
+        return 1
     slots = rotor.pulses_per_revolution
     run_per_slot = 2.0 * np.pi * rotor.calibration_distance / slots
     finest = _FINEST_WIND_RUN * rotor.distance_constant
@@ -98,10 +113,11 @@ class KalmanCore:
         self._lag = round(settings.smoother_lag * 1e9)
         self._weight = block_ns * 1e-9 / settings.adaptation_time
         self._origin = origin
-        self._segments = list(segments(station))
-        self._segment: Segment = self._segments.pop(0)
-        self._source = CircumstanceSource(self._segment.station, settings.use_air)
-        self._enter(self._segment.station)
+        self._timeline = Timeline(station, origin)
+        self._number = 0
+        first = self._timeline.stations[0]
+        self._source = CircumstanceSource(first, settings.use_air)
+        self._enter(first)
         rotors, vanes = len(self._rotors), len(self._axes)
         self.filter: FilterState = empty_filter(rotors, vanes)
         self.filter.height[0] = station.recording.measuring_height
@@ -110,11 +126,21 @@ class KalmanCore:
         self.vane_names = [v.name for v in self._axes]
         for i, rotor in enumerate(self._rotors):
             self.filter.slots[i] = rotor.pulses_per_revolution
-            self.filter.stride[i] = useful_stride(rotor)
+            self.filter.stride[i] = min(
+                useful_stride(r)
+                for later in self._timeline.stations
+                for r in rotors_of(later)
+                if r.name == rotor.name
+            )
             if rotor.pulses_per_revolution > LARGEST_SLOTS:
                 self.filter.slots[i] = 1
+        self._tracks = [
+            RotorTrack(r.name, station, origin) if self._has_faults(r.name) else None
+            for r in self._rotors
+        ]
+        self._readers = [NoseReader(a.name, station, origin) for a in self._axes]
         self._ring: Ring = empty_ring(64, rotors, vanes)
-        self.watch = PropellerWatch(self._segment.station, settings)
+        self.watch = PropellerWatch(first, settings)
         self._waiting: list[Block] = []
         self._started = False
         self.restarts = 0
@@ -127,11 +153,16 @@ class KalmanCore:
         self._instruments = instruments_of(station)
         self._source.station = station
 
+    def _has_faults(self, rotor: str) -> bool:
+        """Whether a rotor loses or doubles edges at any time."""
+        every = (r for s in self._timeline.stations for r in rotors_of(s))
+        return any(r.name == rotor and loses_edges(r) for r in every)
+
     def _follow_changes(self, start: int) -> None:
-        since = (start - self._origin) * 1e-9
-        while since >= self._segment.stop and self._segments:
-            self._segment = self._segments.pop(0)
-            self._enter(self._segment.station)
+        number = self._timeline.number(start)
+        if number != self._number:
+            self._number = number
+            self._enter(self._timeline.stations[number])
 
     def process(self, block: Block) -> Estimates:
         """Take a block; estimates that became final by it."""
@@ -181,22 +212,19 @@ class KalmanCore:
         value: list[FloatArray] = [np.full(outputs.size, np.nan)]
         extra: list[FloatArray] = [np.zeros(outputs.size)]
         for i, axis in enumerate(self._axes):
-            part = block.readings[axis.name]
-            usable = headings(axis.instrument, part.time, part.value[:, 0], self._origin)
+            usable = self._readers[i].read(block.readings[axis.name], block.stop)
             times.append(usable.time)
             kinds.append(np.full(usable.time.size, READING, dtype=np.int64))
             index.append(np.full(usable.time.size, i, dtype=np.int64))
             value.append(usable.heading)
-            extra.append(usable.extra_variance)
+            extra.append(usable.half_width)
         for i, rotor in enumerate(self._rotors):
-            series = block.pulses[rotor.name]
-            turns = series.value[:, 0]
-            kind = np.where(np.isnan(turns), EDGE, TURNS).astype(np.int64)
-            times.append(series.time)
+            passed, kind, told = self._turned(i, block.pulses[rotor.name])
+            times.append(passed)
             kinds.append(kind)
-            index.append(np.full(series.time.size, i, dtype=np.int64))
-            value.append(turns * 2.0 * np.pi)
-            extra.append(np.zeros(series.time.size))
+            index.append(np.full(passed.size, i, dtype=np.int64))
+            value.append(told)
+            extra.append(np.zeros(passed.size))
         time = np.concatenate(times)
         kind_of = np.concatenate(kinds)
         which = np.concatenate(index)
@@ -208,6 +236,25 @@ class KalmanCore:
             np.concatenate(value)[order],
             np.concatenate(extra)[order],
         )
+
+    def _turned(self, i: int, part: Series) -> tuple[IntArray, IntArray, FloatArray]:
+        """Times, kinds and values of a rotor's events in a block, as `kalman_kernel.run` has them.
+
+        Where the station file says how edges get lost or doubled, they are counted here.
+        """
+        turns = part.value[:, 0]
+        track = self._tracks[i]
+        if track is None or not np.isnan(turns).all():
+            kinds = np.where(np.isnan(turns), EDGE, TURNS).astype(np.int64)
+            return part.time, kinds, turns * 2.0 * np.pi
+        before = float(track.angle[-1]) if track.angle.size else 0.0
+        new = track.take(part)
+        time, angle = track.time[track.time.size - new :], track.angle[track.angle.size - new :]
+        slot = 2.0 * np.pi / track.rotor.pulses_per_revolution
+        self.filter.tally[i, 2] += max(part.time.size - new, 0)
+        track.forget_before(part.time[-1] if part.time.size else 0)
+        passed = np.rint(np.diff(angle, prepend=before) / slot)
+        return time, np.full(new, EDGE, dtype=np.int64), passed
 
     def _run(self, block: Block) -> Estimates:
         events = self._events(block)
@@ -290,7 +337,11 @@ class KalmanCore:
             to_earth,
         )  # fmt: skip
         self.watch.take(estimates, out.states[:filled, 3 : 3 + 2 * len(self._rotors) : 2])
-        return estimates
+        parts = [
+            with_site_covariance(self._timeline.stations[number], part_of(estimates, here))
+            for number, here in self._timeline.parts(time)
+        ]
+        return joined(parts)
 
     def finish(self) -> Estimates:
         """No block will follow; the remaining estimates."""

@@ -83,8 +83,9 @@ def run(
         time: Of the events, in order [ns].
         kind: OUTPUT, READING, EDGE or TURNS.
         index: Vane or rotor; running number of an output.
-        value: Angle of a reading or of the rotor [rad]; nan for an edge.
-        extra: Additional variance of a reading [rad^2].
+        value: Angle of a reading or of the rotor [rad]; for an edge the slots passed since the last
+            one where lost edges have been counted, else nan.
+        extra: Half the width of the range that a reading stands for [rad], 0 for an ordinary one.
         circumstances: Mount and air at the events, shape (n, 23).
         stop: End of the last block [ns].
         block: Length of a block [ns].
@@ -113,8 +114,12 @@ def run(
             continue
         this = kind[i]
         which = index[i]
+        counted = this == EDGE and not math.isnan(value[i])
+        if counted:
+            f.edge_count[which] += int(value[i]) - 1
+            f.tally[which, 1] += int(value[i]) - 1
         if this == EDGE:
-            if is_extra_edge(f, s, which, time[i]):
+            if not counted and is_extra_edge(f, s, which, time[i]):
                 if f.rejected[which] == 0:
                     f.tally[which, 2] += 1
                     f.rejected[which] = 1
@@ -145,7 +150,7 @@ def run(
         if this == READING:
             correct_by_reading(f, s, ring, at, which, value[i], extra[i])
         elif this == EDGE:
-            correct_by_edge(f, s, ring, at, which, time[i])
+            correct_by_edge(f, s, ring, at, which, time[i], counted)
         elif this == TURNS:
             f.tally[which, 0] += 1
             f.stride[which] = 0

@@ -78,7 +78,7 @@ class NaiveCore:
 
     def __init__(self, station: Station, settings: EstimatorSettings, origin: int) -> None:
         self._settings = settings
-        self._history = History(station, origin, 2.0)
+        self._history = History(station, origin, 2.0, restored=False)
         self._source = CircumstanceSource(station, settings.use_air)
 
     def process(self, block: Block) -> Estimates:

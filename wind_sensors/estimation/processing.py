@@ -31,8 +31,15 @@ def _stretches(time: TimeArray, jump_ns: int) -> list[tuple[int, int]]:
 def _inputs(
     estimator: StreamingEstimator, recording: Recording
 ) -> list[tuple[TimeArray, _Feed]]:
-    """Times of each input and what to do with its i-th message."""
+    """Times of measurement of each input and what to do with its i-th message.
+
+    A clock that drifts or stamps late does not delay its messages: live they would come when they
+    were measured.
+    """
     inputs: list[tuple[TimeArray, _Feed]] = []
+    stamps = [p.time for p in recording.pulses.values()]
+    stamps += [a.time for a in recording.angles.values()]
+    zero = min((int(time.min()) for time in stamps if time.size), default=0)
 
     def pulses(name: str, time: list[int], turns: list[float] | None) -> _Feed:
         if turns is None:
@@ -44,9 +51,11 @@ def _inputs(
 
     for name, p in recording.pulses.items():
         turns = None if p.turns is None else p.turns.tolist()
-        inputs.append((p.time, pulses(name, p.time.tolist(), turns)))
+        feed = pulses(name, p.time.tolist(), turns)
+        inputs.append((estimator.measured(name, p.time, zero), feed))
     for name, a in recording.angles.items():
-        inputs.append((a.time, angles(name, a.time.tolist(), a.angle.tolist())))
+        feed = angles(name, a.time.tolist(), a.angle.tolist())
+        inputs.append((estimator.measured(name, a.time, zero), feed))
     states = recording.platform
     if states is not None:
         times = states.time.tolist()
@@ -57,7 +66,7 @@ def _inputs(
                 states.position[i],
             )  # fmt: skip
 
-        inputs.append((states.time, platform))
+        inputs.append((estimator.measured("platform", states.time, zero), platform))
     if recording.temperature is not None:
         warmth = recording.temperature
         inputs.append(

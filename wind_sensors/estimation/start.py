@@ -18,6 +18,7 @@ from wind_sensors.estimation.turbulence_process import (
     WIND_STATES,
     initial_levels,
 )
+from wind_sensors.estimation.turn_counting import slots_between
 from wind_sensors.instruments.propeller_array import uncorrected_velocity
 from wind_sensors.station.model import Cup, Propeller
 
@@ -39,7 +40,8 @@ def _first_rate(blocks: list[Block], rotor: Cup | Propeller) -> tuple[float, flo
         rate = 2.0 * np.pi * float(turns[-1] - turns[0]) / duration
         before = (times[0] - blocks[0].start) * 1e-9
         return rotor.calibration_distance * rate, 2.0 * np.pi * turns[0] - rate * before
-    made = (times.size - 1) / rotor.pulses_per_revolution
+    slots = float(slots_between(np.diff(times) * 1e-9, rotor.electronics.dead_time).sum())
+    made = slots / rotor.pulses_per_revolution
     return 2.0 * np.pi * rotor.calibration_distance * made / duration, 0.0
 
 

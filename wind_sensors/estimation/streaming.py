@@ -30,17 +30,28 @@ from wind_sensors.estimation.intake import (
     Block,
     Correction,
     Intake,
-    clock_correction,
 )
 from wind_sensors.estimation.inverse import InverseCore
 from wind_sensors.estimation.kalman import KalmanCore
 from wind_sensors.estimation.naive import NaiveCore
 from wind_sensors.estimation.outputs import HealthItem, WindEstimate, WindowStatistics
 from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.timeline import changing_correction
 from wind_sensors.estimation.windows import WindowAccumulator
-from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station
+from wind_sensors.station.changes import segments
+from wind_sensors.station.model import (
+    Angle,
+    AnyInstrument,
+    Bivane,
+    Clock,
+    Cup,
+    Platform,
+    Propeller,
+    Station,
+)
 
 FloatArray = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
 
 _PLATFORM, _TEMPERATURE, _PRESSURE = "platform", "temperature", "pressure"
 _SPEED_MEMORY = 0.9
@@ -50,34 +61,47 @@ _LOOK_AHEAD_NS = (100_000_000, 2_000_000_000)
 is a slow source waited for."""
 
 
+def _clock(entry: AnyInstrument | Platform) -> Clock:
+    """The clock of an entry, with the delay of a low-pass filter as part of its latency."""
+    if isinstance(entry, Angle) and entry.filter_time_constant > 0.0:
+        late = entry.clock.latency + entry.filter_time_constant
+        return entry.clock.model_copy(update={"latency": late})
+    return entry.clock
+
+
+def _clocks(station: Station) -> dict[str, list[tuple[float, Clock]]]:
+    """The clock of each entry in each stretch of the station, with the stretch's begin [s]."""
+    clocks: dict[str, list[tuple[float, Clock]]] = {}
+    for segment in segments(station):
+        for instrument in segment.station.instruments:
+            clocks.setdefault(instrument.name, []).append((segment.start, _clock(instrument)))
+        platform = segment.station.platform
+        if platform is not None:
+            clocks.setdefault(_PLATFORM, []).append((segment.start, _clock(platform)))
+    return clocks
+
+
 def _inputs(station: Station) -> dict[str, tuple[int, int, Correction | None]]:
     inputs: dict[str, tuple[int, int, Correction | None]] = {}
+    clocks = _clocks(station)
     for instrument in station.instruments:
-        clock = instrument.clock
+        correction = changing_correction(clocks[instrument.name])
         if isinstance(instrument, (Cup, Propeller)):
-            inputs[instrument.name] = (PULSES, 1, clock_correction(clock.latency, clock.drift))
+            inputs[instrument.name] = (PULSES, 1, correction)
         elif isinstance(instrument, Angle):
-            late = clock.latency + instrument.filter_time_constant
-            correction = clock_correction(late, clock.drift)
             inputs[instrument.name] = (READINGS, 1, correction)
             if isinstance(instrument, Bivane):
                 inputs[f"{instrument.name}/elevation"] = (READINGS, 1, correction)
     if station.platform is not None:
-        clock = station.platform.clock
-        inputs[_PLATFORM] = (PLATFORM, 13, clock_correction(clock.latency, clock.drift))
+        inputs[_PLATFORM] = (PLATFORM, 13, changing_correction(clocks[_PLATFORM]))
     inputs[_TEMPERATURE] = (TEMPERATURE, 1, None)
     inputs[_PRESSURE] = (PRESSURE, 1, None)
     return inputs
 
 
 def _longest_delay(station: Station) -> float:
-    clocks = [i.clock for i in station.instruments]
-    if station.platform is not None:
-        clocks.append(station.platform.clock)
-    filters = [i.filter_time_constant for i in station.instruments if isinstance(i, Angle)]
-    earliest = min([c.latency for c in clocks], default=0.0)
-    latest = max([c.latency for c in clocks], default=0.0)
-    return max(0.0, latest) + max(filters, default=0.0) - min(0.0, earliest)
+    latencies = [clock.latency for known in _clocks(station).values() for _, clock in known]
+    return max(0.0, *latencies) - min(0.0, *latencies)
 
 
 class StreamingEstimator:
@@ -190,6 +214,19 @@ class StreamingEstimator:
             else:
                 self._intake.records[name].invalid += 1
 
+    def measured(self, name: str, stamps: TimeArray, zero: int) -> TimeArray:
+        """Times of measurement [ns] of an input's messages by what is known of its clock.
+
+        Args:
+            name: Instrument, `platform`, `temperature` or `pressure`.
+            stamps: [ns], shape (n,).
+            zero: Stamp from which a drift counts [ns].
+        """
+        correction = self._inputs[name][2] if name in self._inputs else None
+        if correction is None:
+            return stamps
+        return np.array([correction(t, zero) for t in stamps.tolist()], dtype=np.int64)
+
     def advance(self, time_ns: int) -> None:
         """Time has passed although no message came."""
         self._intake.advance(time_ns)
@@ -241,8 +278,8 @@ class StreamingEstimator:
             return KalmanCore(self.station, self.settings, self._block, origin)
         if is_array(self.station):
             if self.settings.method == "inverse":
-                return InverseArrayCore(self.station, self.settings)
-            return NaiveArrayCore(self.station, self.settings)
+                return InverseArrayCore(self.station, self.settings, origin)
+            return NaiveArrayCore(self.station, self.settings, origin)
         if self.settings.method == "inverse":
             return InverseCore(self.station, self.settings, origin)
         return NaiveCore(self.station, self.settings, origin)

@@ -11,6 +11,7 @@ from wind_sensors.estimation.circumstances import CircumstanceSource
 from wind_sensors.estimation.forward import MOUNT_ROTATION
 from wind_sensors.estimation.history import History
 from wind_sensors.estimation.intake import Block, merged
+from wind_sensors.estimation.timeline import Timeline
 from wind_sensors.station.model import Cup, Station
 
 _TOGETHER = 20
@@ -66,7 +67,8 @@ class RunCounter:
         self.history = History(station, start, 1.0)
         self.rotor = self.history.rotor
         self.vane = self.history.vane
-        self._source = CircumstanceSource(station, use_air)
+        self._timeline = Timeline(station, start)
+        self._source = CircumstanceSource(self._timeline.stations[0], use_air)
         self._start = start
         self._length = length
         self._last_time = 0
@@ -103,6 +105,7 @@ class RunCounter:
         block = merged(self._pending)
         self._pending = []
         h = self.history
+        self._source.station = self._timeline.stations[self._timeline.number(block.start)]
         self._source.take(block)
         readings, edges = h.take(block)
         if readings:
