@@ -27,7 +27,7 @@ EVERY = 2
 EVERY_WHILE_TOLD = 4
 """The same while a mismatch is told: it is weighed anew."""
 
-STRENGTH = 40.0
+STRENGTH = 50.0
 """Misfit, in squares of white differences, that a mismatch must account for."""
 
 PLAIN = 100.0

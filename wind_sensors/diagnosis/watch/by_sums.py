@@ -192,7 +192,7 @@ class SumsJudge:
             self._test.settle(departure, precision)
             told.end(block.start)
             return
-        where: Located = located(since, self._usual)
+        where: Located = located(since, self._usual, named)
         told.finding = Finding(
             onset=since[0].start if known is None else min(known.onset, since[0].start),
             detected=block.stop if known is None else known.detected,

@@ -62,14 +62,23 @@ class UsualMisfit:
         return total / blocks
 
 
-def located(blocks: Sequence[Evidence], usual: UsualMisfit) -> Located:
-    """The channel with the largest excess over the blocks, in its unit."""
+def located(
+    blocks: Sequence[Evidence], usual: UsualMisfit, named: Sequence[Candidate] = ()
+) -> Located:
+    """The channel with the largest excess over the blocks, in its unit.
+
+    Args:
+        blocks: Since the onset.
+        usual: Misfit of healthy blocks.
+        named: Candidates; the channels of the best one's instrument go first.
+    """
     names = list(dict.fromkeys(name for b in blocks for name in b.channels))
+    blamed = [n for n in names if named and n.partition("/")[0] == named[0].instrument]
     excess = {}
     for name in names:
         of = [b.channels[name] for b in blocks if name in b.channels]
         excess[name] = max(sum(c.chi_square - usual.of(name) * c.count for c in of), 0.0)
-    channel = max(names, key=lambda n: excess[n])
+    channel = max(blamed or names, key=lambda n: excess[n])
     of = [b.channels[channel] for b in blocks if channel in b.channels]
     speed = [b.speed for b in blocks]
     is_vane = channel.endswith("vane_angle")
