@@ -121,7 +121,8 @@ def test_what_was_planted_is_told_beside_what_was_said() -> None:
         Row("mast", "vane_offset vane, 8 degrees", "named: icing (cup)", 61.4, "wrong name"),
         Row("roof", "as it is", "none", 3.0),
     ]
-    head, _, wrong, free = row_table([vars(row) for row in rows])
+    *about, _, head, _, wrong, free = row_table([vars(row) for row in rows], {"version": "x"})
+    assert about == ["- version: x"]
     assert head.count("|") == wrong.count("|") == free.count("|")
     assert "| wrong name | named: icing (cup) | 61 |" in wrong
     assert "| as it is |  | none |" in free

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -112,7 +114,15 @@ def _collect(item: tuple[Path, Path]) -> None:
         filter(None, [root, environment.get("PYTHONPATH", "")])
     )
     command = [sys.executable, "-m", "wind_sensors.report.regressors", str(source)]
-    subprocess.run([*command, "-o", str(target)], env=environment, check=False, capture_output=True)
+    part = target.with_suffix(".part")
+    with tempfile.TemporaryDirectory(prefix="wind-peers-") as place:
+        written = Path(place) / target.name
+        subprocess.run(
+            [*command, "-o", str(written)], env=environment, check=False, capture_output=True
+        )
+        if written.is_file():
+            shutil.copyfile(written, part)
+            part.replace(target)
 
 
 def whiten(residual: Array, signatures: Array, channel: Array) -> tuple[Array, Array]:

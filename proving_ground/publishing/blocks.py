@@ -57,7 +57,8 @@ def blocks(folder: Path) -> dict[str, str]:
     if (folder / PEERS).is_file():
         found["peers"] = row_lines(*read_rows(folder / PEERS))
     if (folder / REAL).is_file():
-        found["real"] = row_table(json.loads((folder / REAL).read_text(encoding="utf-8")))
+        real = json.loads((folder / REAL).read_text(encoding="utf-8"))
+        found["real"] = row_table(real["rows"], real["about"])
     found["sizes"] = size_lines()
     found["shares"] = [
         ", ".join(f"{name.replace('_', ' ')} {100 * s:.0f} %" for name, s in SHARES.items())

@@ -19,6 +19,7 @@ from proving_ground.real.sources import SOURCES, Source, fetch
 from proving_ground.real.turbulence import on_grid, read_sonic, record_in
 from proving_ground.scoring.outcome import findings_of, outcome_of
 from proving_ground.scoring.wording import verdict_line
+from proving_ground.sealing.trial import program_version
 from proving_ground.stations import random_station
 from wind_sensors.errors import UserError
 
@@ -66,8 +67,10 @@ def run_real(output: Path, local: Path | None = None) -> Path:
             rows.append(found)
             say(f"   {found.record}, {found.planted}: {found.verdict}", markup=False)
     page = output / "real.md"
-    page.write_text(_page(rows, notes), encoding="utf-8")
-    numbers = json.dumps([vars(r) for r in rows], indent=1)
+    about = program_version()
+    entries = [vars(r) for r in rows]
+    page.write_text(_page(entries, about, notes), encoding="utf-8")
+    numbers = json.dumps({"about": about, "rows": entries}, indent=1)
     (output / NUMBERS).write_text(numbers + "\n", encoding="utf-8")
     return page
 
@@ -177,7 +180,7 @@ def _last_line(text: str) -> str:
     return lines[-1] if lines else "it said nothing"
 
 
-def _page(rows: Sequence[Row], notes: Sequence[str]) -> str:
+def _page(rows: Sequence[dict[str, Any]], about: dict[str, Any], notes: Sequence[str]) -> str:
     lines = ["# Real records", ""]
     lines += [f"- {s.mapping}: PyPI package {s.package} {s.version} ({s.licence})" for s in SOURCES]
     lines += [
@@ -186,15 +189,16 @@ def _page(rows: Sequence[Row], notes: Sequence[str]) -> str:
         "they were planted. Instruments in real turbulence are the proving ground's, driven by "
         f"the sonic's wind with {ADDED_WIND:g} m/s of steady wind added.",
         "",
-        *row_table([vars(r) for r in rows]),
+        *row_table(rows, about),
     ]
     lines += ["", *[f"- {note}" for note in notes]] if notes else []
     return "\n".join(lines) + "\n"
 
 
-def row_table(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """What was planted into real records and what was said, as a table."""
-    lines = ["| record | planted | outcome | verdict | seconds |", "|---|---|---|---|---|"]
+def row_table(rows: Sequence[dict[str, Any]], about: dict[str, Any]) -> list[str]:
+    """What was planted into real records and what was said, as a table below what diagnosed."""
+    lines = [f"- {key}: {value}" for key, value in about.items()]
+    lines += ["", "| record | planted | outcome | verdict | seconds |", "|---|---|---|---|---|"]
     return lines + [
         f"| {r['record']} | {r['planted']} | {r['outcome']} | {r['verdict']} | {r['seconds']:.0f} |"
         for r in rows
