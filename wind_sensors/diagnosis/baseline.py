@@ -70,6 +70,8 @@ class Baseline:
         means: Amplitude of each template shared by the healthy recordings, by
             `effect|instrument|template number`, in units of the template.
         standing: Scatter of each template's amplitude between them.
+        loudest_gain: Largest drop of the cost, beyond its parameters, that an effect promises in
+            one healthy recording judged by the others.
     """
 
     recordings: tuple[str, ...]
@@ -78,6 +80,7 @@ class Baseline:
     channels: Mapping[str, ChannelBaseline]
     means: Mapping[str, float] = field(default_factory=dict)
     standing: Mapping[str, float] = field(default_factory=dict)
+    loudest_gain: float = 0.0
 
     @property
     def calibrated(self) -> bool:
@@ -118,6 +121,7 @@ class Baseline:
             },
             "means": dict(self.means),
             "standing": dict(self.standing),
+            "loudest_gain": self.loudest_gain,
         }
         return json.dumps(content, indent=1)
 
@@ -140,6 +144,7 @@ class Baseline:
                 },
                 means=content["means"],
                 standing=content["standing"],
+                loudest_gain=content["loudest_gain"],
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem

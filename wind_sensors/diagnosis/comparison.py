@@ -9,7 +9,7 @@ whitened differences, measured minus simulated, in which a healthy station gives
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -114,6 +114,9 @@ class Comparison:
         wind_from: Direction the apparent wind comes from at the bins, continuous [rad].
         measured: Of the recording.
         mask: Weight of each bin, 1 inside the blocks that count, 0 outside; None: all count.
+        expected: Simulated deviation of each vane from `direction` [rad], by channel name.
+            Deviations are counted on the turn that lies nearest to it, so that a vane which
+            swings through the opposite direction does not jump by a turn in one series only.
     """
 
     recording: Recording
@@ -126,6 +129,7 @@ class Comparison:
     wind_from: FloatArray
     measured: Simulated
     mask: FloatArray | None = None
+    expected: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def within(self, mask: FloatArray) -> Comparison:
         """The same comparison in the blocks of a mask only, shape (n,)."""
@@ -215,7 +219,9 @@ class Comparison:
                 statistics[channel.name] = np.concatenate((bands, intervals))
             else:
                 readings = angles[channel.instrument]
-                deviation = angle_series(readings, self.direction, self.grid)
+                deviation = self._nearest_turn(
+                    channel, angle_series(readings, self.direction, self.grid)
+                )
                 values = deviation * self.speed
                 full = spectra.to_cosine(self.masked(values))
                 statistics[channel.name] = np.concatenate(
@@ -230,6 +236,18 @@ class Comparison:
             cosine[channel.name] = full[: self.coefficients]
         return Simulated(cosine, series, statistics)
 
+    def _nearest_turn(
+        self, channel: Channel, deviation: FloatArray, time: FloatArray | None = None
+    ) -> FloatArray:
+        """Deviations of a vane moved by whole turns to where they are expected."""
+        expected = self.expected.get(channel.name)
+        if expected is None:
+            return deviation
+        if time is not None:
+            expected = np.interp(time, self.grid.centres, expected)
+        away = np.angle(np.exp(1j * (deviation - expected)))
+        return np.asarray(expected + away, dtype=np.float64)
+
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""
         return values if self.mask is None else values * self.mask
@@ -241,6 +259,7 @@ class Comparison:
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
         deviation = np.nan_to_num(np.angle(np.exp(1j * (readings.angle - around))))
+        deviation = self._nearest_turn(channel, deviation, time)
         weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
         return self._log_spectrum(
             spectra.to_cosine(np.asarray(weighted)), dt, channel, 0.4 / dt
@@ -362,10 +381,21 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
         wind_from=np.interp(grid.centres, at, coming_from),
         measured=empty,
     )
+    comparison = replace(comparison, expected=_expected(comparison))
     seen = _where_reference_is(recording, grid)
     if seen is not None:
         return comparison.within(seen)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
+
+
+def _expected(comparison: Comparison) -> dict[str, FloatArray]:
+    """Simulated deviation of each vane from the slow direction [rad]."""
+    _, angles = comparison.signals(comparison.station)
+    return {
+        c.name: angle_series(angles[c.instrument], comparison.direction, comparison.grid)
+        for c in comparison.channels
+        if c.kind == "vane_angle"
+    }
 
 
 def _where_reference_is(recording: Recording, grid: Grid) -> FloatArray | None:

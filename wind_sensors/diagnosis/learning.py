@@ -20,7 +20,17 @@ from wind_sensors.diagnosis.comparison import LOW_END, Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, with_effect
 from wind_sensors.diagnosis.observation import channels_of
-from wind_sensors.diagnosis.signatures import in_parallel, signature_bank, templates_of
+from wind_sensors.diagnosis.screening import scores_of
+from wind_sensors.diagnosis.search import (
+    PENALTY_PER_FURTHER_PARAMETER,
+    PENALTY_PER_PARAMETER,
+)
+from wind_sensors.diagnosis.signatures import (
+    Template,
+    in_parallel,
+    signature_bank,
+    templates_of,
+)
 from wind_sensors.diagnosis.whitening import trust_of, unstanding, whitener_of
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
@@ -255,6 +265,40 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
     return out
 
 
+def loudest_gain(rows: Sequence[Evidence], templates: Mapping[str, Template]) -> float:
+    """Largest gain that any effect promises in a healthy recording judged by the others.
+
+    Args:
+        rows: Of each healthy recording.
+        templates: By key.
+
+    Returns:
+        Drop of the cost beyond what its parameters cost; 0 with fewer than three recordings.
+    """
+    if len(rows) < 3:
+        return 0.0
+    loudest = 0.0
+    for left_out, row in enumerate(rows):
+        others = [r for k, r in enumerate(rows) if k != left_out]
+        means, sizes = standing_means(others), standing_sizes(others, standing_means(others))
+        known = [templates[key] for key in row.keys]
+        standing = np.array([max(sizes.get(t.key, 0.0), t.smallest_standing) for t in known])
+        shared = np.array([means.get(t.key, 0.0) for t in known])
+        seen = row.seen - row.gram @ shared
+        kept = standing > 0.0
+        part = row.gram[:, kept]
+        inner = np.linalg.solve(
+            np.diag(1.0 / standing[kept] ** 2) + row.gram[np.ix_(kept, kept)], part.T
+        )
+        gram = row.gram - part @ inner
+        seen = seen - inner.T @ seen[kept]
+        for score in scores_of(known, gram, seen):
+            parameters = len(score.template.effect.parameters)
+            cost = PENALTY_PER_PARAMETER + PENALTY_PER_FURTHER_PARAMETER * (parameters - 1)
+            loudest = max(loudest, score.gain - cost)
+    return loudest
+
+
 def learn(
     recordings: Sequence[Recording],
     station: Station | None = None,
@@ -314,8 +358,14 @@ def learn(
         (lambda share: progress(0.2 + 0.8 * share)) if progress else None,
     )
     means = standing_means(rows)
+    templates = {
+        t.key: t
+        for c in comparisons
+        for t in templates_of(c, baseline.station, catalogue())
+    }
     return replace(
         baseline,
+        loudest_gain=loudest_gain(rows, templates),
         recordings=tuple(r.name for r in recordings),
         means=means,
         standing=standing_sizes(rows, means),

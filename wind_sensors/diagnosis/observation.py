@@ -244,38 +244,42 @@ def _interval_statistics(
     total = np.zeros(slots)
     number = np.zeros(slots)
     squares = 0.0
-    turning = 2.0 * math.pi / slots
-    once_slot = 0.0 + 0.0j
-    once_wind = 0.0 + 0.0j
-    twice_wind = 0.0 + 0.0j
+    angle = 2.0 * math.pi / slots * np.arange(slots)
+    slot_cos, slot_sin = np.cos(angle), np.sin(angle)
+    wind_cos, wind_sin = np.cos(direction), np.sin(direction)
+    slot_x, slot_y, once_x, once_y, twice_x, twice_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     first = slots // 2
+    slot = first - 1
     kept = 0
     for j in range(edges - slots):
         i = j + first
+        slot = 0 if slot + 1 == slots else slot + 1
         place = min(max(int(time[i] / dt), 0), weight.size - 1)
         if weight[place] <= 0.5:
             continue
         revolution = (time[j + slots] - time[j]) / slots
         deviation = (time[i + 1] - time[i]) / max(revolution, 1e-9) - 1.0
         deviation = min(max(deviation, -0.8), 0.8)
-        slot = i % slots
         total[slot] += deviation
         number[slot] += 1.0
         squares += deviation * deviation
         kept += 1
-        turned = turning * slot
-        away = turned - direction[place]
-        once_slot += deviation * complex(math.cos(turned), -math.sin(turned))
-        once_wind += deviation * complex(math.cos(away), -math.sin(away))
-        twice = 2.0 * away
-        twice_wind += deviation * complex(math.cos(twice), -math.sin(twice))
+        c, s = slot_cos[slot], slot_sin[slot]
+        slot_x += deviation * c
+        slot_y += deviation * s
+        away_cos = c * wind_cos[place] + s * wind_sin[place]
+        away_sin = s * wind_cos[place] - c * wind_sin[place]
+        once_x += deviation * away_cos
+        once_y += deviation * away_sin
+        twice_x += deviation * (away_cos * away_cos - away_sin * away_sin)
+        twice_y += deviation * 2.0 * away_cos * away_sin
     if kept < 100:
         return out
     means = total / np.maximum(number, 1.0)
     variance = squares / kept - (np.sum(total) / kept) ** 2
     out[2] = math.sqrt(max(np.var(means) - variance * slots / kept, 0.0))
-    out[3] = 2.0 * abs(once_slot) / kept
-    out[4] = 2.0 * abs(once_wind) / kept
+    out[3] = 2.0 * math.hypot(slot_x, slot_y) / kept
+    out[4] = 2.0 * math.hypot(once_x, once_y) / kept
     if slots > 4:
-        out[5] = 2.0 * abs(twice_wind) / kept
+        out[5] = 2.0 * math.hypot(twice_x, twice_y) / kept
     return out

@@ -18,6 +18,9 @@ FloatArray = npt.NDArray[np.float64]
 WINDOW_STEP = 30.0
 """Onsets and endings are screened every so many seconds."""
 
+SHORTEST_WINDOW = 60.0
+"""What lasts less [s] tells an effect badly from a gust."""
+
 _WEAKEST = 1e-2
 _RIDGE = 1e-3
 
@@ -70,8 +73,18 @@ def screen(
         signatures: White signatures, one a row.
         vector: White vector of what is to be explained.
     """
-    seen = signatures @ vector
-    power = np.einsum("ij,ij->i", signatures, signatures)
+    return scores_of(templates, signatures @ signatures.T, signatures @ vector)
+
+
+def scores_of(templates: Sequence[Template], gram: FloatArray, seen: FloatArray) -> list[Score]:
+    """Scores of all effects, best first, from inner products.
+
+    Args:
+        templates: Of the catalogue.
+        gram: Products of the white signatures, shape (k, k).
+        seen: Products of the signatures with the white vector, shape (k,).
+    """
+    power = np.diag(gram)
     out = []
     for (effect, instrument), members in group_templates(templates).items():
         alive = [k for k in members if power[k] > _WEAKEST]
@@ -80,10 +93,8 @@ def screen(
         single = max(alive, key=lambda k: seen[k] ** 2 / power[k])
         gain = float(seen[single] ** 2 / power[single])
         amplitudes = {templates[single].number: float(seen[single] / power[single])}
-        linear = len(members) <= 4 and len(alive) > 1
-        if linear:
-            part = signatures[alive]
-            gain, solved = _joint(part @ part.T, seen[alive])
+        if len(members) <= 4 and len(alive) > 1:
+            gain, solved = _joint(gram[np.ix_(alive, alive)], seen[alive])
             amplitudes = {
                 templates[k].number: float(a) for k, a in zip(alive, solved, strict=True)
             }
@@ -149,7 +160,7 @@ def windowed_signature(
 def windows(comparison: Comparison) -> list[tuple[float, float]]:
     """Beginnings-to-end, start-to-endings, and middles [s since the first bin]."""
     length = comparison.grid.n * comparison.grid.dt
-    cuts = np.arange(WINDOW_STEP, length - 0.5 * WINDOW_STEP, WINDOW_STEP)
+    cuts = np.arange(SHORTEST_WINDOW, length - SHORTEST_WINDOW + 1.0, WINDOW_STEP)
     out = [(float(c), length) for c in cuts] + [(0.0, float(c)) for c in cuts]
     coarse = cuts[1::4]
     out += [

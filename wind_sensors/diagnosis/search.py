@@ -23,7 +23,12 @@ from wind_sensors.diagnosis.signatures import (
     signature_bank,
     templates_of,
 )
-from wind_sensors.diagnosis.whitening import Whitener, trust_of, whitener_of
+from wind_sensors.diagnosis.whitening import (
+    Whitener,
+    form_signatures,
+    trust_of,
+    whitener_of,
+)
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
@@ -67,12 +72,18 @@ class Searcher:
         """The station as commissioned."""
         return self.baseline.station
 
-    def whitener(self, simulated: Simulated) -> Whitener:
-        """The null seen from the best simulation so far."""
-        trust = trust_of(self.comparison, simulated, self.baseline)
-        return self._whitener(trust)
+    def whitener(self, simulated: Simulated, named: Simulated | None = None) -> Whitener:
+        """The null seen from the best simulation so far.
 
-    def _whitener(self, trust: Mapping[str, Trust]) -> Whitener:
+        Args:
+            simulated: Gives the noise.
+            named: Simulation with effects that are taken for granted, in a form that need not be
+                exact; None: there are none.
+        """
+        trust = trust_of(self.comparison, simulated, self.baseline)
+        return self._whitener(trust, named)
+
+    def _whitener(self, trust: Mapping[str, Trust], named: Simulated | None) -> Whitener:
         templates = self.bank.templates
         standing = np.array(
             [
@@ -82,7 +93,31 @@ class Searcher:
         )
         means = np.array([self.baseline.means.get(t.key, 0.0) for t in templates])
         signatures = self.bank.whitened(self.comparison, trust)
+        lag = self._reference_lag(signatures)
+        signatures = np.concatenate((signatures, lag))
+        standing = np.concatenate((standing, np.ones(len(lag))))
+        means = np.concatenate((means, np.zeros(len(lag))))
+        if named is not None:
+            form = form_signatures(self.comparison, trust, self.bank.without, named)
+            signatures = np.concatenate((signatures, form))
+            standing = np.concatenate((standing, np.ones(len(form))))
+            means = np.concatenate((means, np.zeros(len(form))))
         return whitener_of(self.comparison, trust, signatures, standing, means)
+
+    def _reference_lag(self, signatures: FloatArray) -> FloatArray:
+        """Signature of the delay, common to all channels, between reference and instruments.
+
+        The wind takes up to separation / speed from one to the other; half of that is taken as
+        the standard deviation. Shape (1, m), or (0, m) for a reference at the same place.
+        """
+        reference = self.comparison.recording.station.reference
+        distance = 0.0 if reference is None else reference.separation
+        delay = 0.5 * distance / float(np.mean(self.comparison.speed))
+        row = np.zeros(signatures.shape[1])
+        for template, signature in zip(self.bank.templates, signatures, strict=True):
+            if template.effect.name == "timestamp_latency" and template.number == 0:
+                row += signature * (delay / template.values["latency"])
+        return row[None, :] if np.any(row) else np.zeros((0, row.size))
 
     def white_signatures(self, whitener: Whitener) -> FloatArray:
         """Signatures of the catalogue in a null."""

@@ -13,14 +13,10 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.explanation import ACCEPTED_GAIN, Alternative, Naming
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.guesses import guesses_of
-from wind_sensors.diagnosis.naming import (
-    ACCEPTED_GAIN,
-    Alternative,
-    Naming,
-    name,
-)
+from wind_sensors.diagnosis.naming import name
 from wind_sensors.diagnosis.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
@@ -43,14 +39,21 @@ exact enough to tell them apart."""
 LEAST_LIKENESS = 0.6
 """Cosine between the white corrections of two explanations of the same thing."""
 
-REMAINDER_SCORES = {"frequency": 200.0, "spectrum": 60.0, "statistic": 60.0}
+REMAINDER_SCORES = {
+    "frequency": 60.0,
+    "statistic": 45.0,
+    "spectrum": 30.0,
+    "time": 28.0,
+    "direction": 28.0,
+    "heading": 28.0,
+    "speed": 16.0,
+    "all": 12.0,
+}
 """Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
-raise the power of a band on healthy days, too."""
+raise the power of a band on healthy days, too; a named effect leaves less than this where its form
+may differ from the simulation's."""
 
-REMAINDER_SCORE = 30.0
-"""The same for the other kinds."""
-
-REMAINDER_SHARE = 0.06
+REMAINDER_SHARE = 0.012
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
 REMAINDER_P = 0.05
@@ -175,19 +178,21 @@ def _estimates(naming: Naming) -> list[dict[str, Estimate]]:
     return out
 
 
-def _equal(naming: Naming) -> list[Alternative]:
-    """Alternatives to a single named effect that fit as well."""
-    if len(naming.fit.terms) != 1:
-        return []
-    limit = max(2.0 * EQUAL_LIKELIHOOD, EQUAL_SHARE * naming.gain)
-    own = naming.fit.terms[0]
-    out: list[Alternative] = []
+def _equal(naming: Naming) -> list[tuple[int, Alternative]]:
+    """Explanations that fit as well with one effect exchanged: its position, the explanation."""
+    own = [t.key for t in naming.fit.terms]
+    share = EQUAL_SHARE if len(own) == 1 else 0.0
+    limit = max(2.0 * EQUAL_LIKELIHOOD, share * naming.gain)
+    seen = set(own)
+    out: list[tuple[int, Alternative]] = []
     for alternative in naming.alternatives:
-        term = alternative.fit.terms[-1]
-        if term.key == own.key or any(a.fit.terms[-1].key == term.key for a in out):
+        theirs = [t.key for t in alternative.fit.terms]
+        missing = [k for k, key in enumerate(own) if key not in theirs]
+        if len(theirs) != len(own) or len(missing) != 1 or theirs[-1] in seen:
             continue
         if alternative.behind < limit and _alike(naming, alternative):
-            out.append(alternative)
+            seen.add(theirs[-1])
+            out.append((missing[0], alternative))
     return out
 
 
@@ -201,8 +206,8 @@ def _alike(naming: Naming, alternative: Alternative) -> bool:
 
 def _remainder(naming: Naming, bank: RegionBank) -> tuple[float, float, float]:
     """Largest remaining score relative to its limit, its p value, its share of the misfit."""
-    scores = bank.scores(naming.fit.vector)
-    limits = np.array([REMAINDER_SCORES.get(r.kind, REMAINDER_SCORE) for r in bank.regions])
+    scores = bank.scores(naming.adequate.of(naming.fit.simulated))
+    limits = np.array([REMAINDER_SCORES[r.kind] for r in bank.regions])
     worst = int(np.argmax(scores / limits))
     left = float(scores[worst])
     share = left / (left + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
@@ -266,7 +271,7 @@ def smallest_detectable(
 
 def _verdict(
     naming: Naming,
-    equal: list[Alternative],
+    equal: list[tuple[int, Alternative]],
     remainder: tuple[float, float, float],
     detectable: Mapping[str, tuple[float, str, float]],
     located_p: float,
@@ -328,8 +333,10 @@ def diagnose(
     bank = region_bank(whitener, searcher.bank.without)
     report("locating")(0.5)
     before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
-    after = strongest(whitener, bank, naming.fit.vector, naming.fit.simulated)
-    remainder = _remainder(naming, bank)
+    rest = region_bank(naming.adequate, searcher.bank.without)
+    left = naming.adequate.of(naming.fit.simulated)
+    after = strongest(naming.adequate, rest, left, naming.fit.simulated)
+    remainder = _remainder(naming, rest)
     detectable = smallest_detectable(searcher, whitener)
     equal = _equal(naming)
     located_p = bank.p_value(max(f.score for f in before))
@@ -366,7 +373,7 @@ def diagnose(
 
 def _findings(
     naming: Naming,
-    equal: list[Alternative],
+    equal: list[tuple[int, Alternative]],
     before: list[Found],
     bank: RegionBank,
     baseline: Baseline,
@@ -397,21 +404,22 @@ def _findings(
         out.append(
             Finding(
                 term, estimates[k], own, float(np.clip(share, 0.0, 1.0)),
-                bank.p_value(own.score), behind, proof, 1 if equal else 0,
+                bank.p_value(own.score), behind, proof,
+                k + 1 if any(position == k for position, _ in equal) else 0,
             )
         )  # fmt: skip
-    for alternative in equal:
+    for position, alternative in equal:
         term = alternative.fit.terms[-1]
+        rival = out[position]
         values = {
             p.name: Estimate(term.values[p.name], float("nan"), float("nan"), p.unit)
             for p in term.effect.parameters
         }
         out.append(
             Finding(
-                term, values, out[0].located, out[0].share, out[0].p,
-                ((naming.fit.terms[0].effect.name, naming.fit.terms[0].instrument,
-                  -0.5 * alternative.behind),),
-                None, 1,
+                term, values, rival.located, rival.share, rival.p,
+                ((rival.term.effect.name, rival.term.instrument, -0.5 * alternative.behind),),
+                None, position + 1,
             )
         )  # fmt: skip
     return tuple(out)

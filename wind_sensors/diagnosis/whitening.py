@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -100,6 +101,77 @@ class Whitener:
     def of_station(self, station: Station) -> FloatArray:
         """White vector of a station."""
         return self.of(self.comparison.simulate(station))
+
+
+FORM_ERROR = 0.1
+"""Standard deviation, relative to a named effect's own signature, of what its true form adds to
+the simulated one: in each part of the wind's range, each band, each statistic."""
+
+_FORM_BANDS = (0.0, 0.01, 0.05, 0.2, 1.25)
+
+
+def form_signatures(
+    comparison: Comparison,
+    trust: Mapping[str, Trust],
+    without: Simulated,
+    corrected: Simulated,
+) -> FloatArray:
+    """How a named effect may differ in form from its simulation, one possibility a row.
+
+    The change that the effect makes in the simulated signals may be larger or smaller than it
+    should be in parts of the wind's range (speed, direction) and of the frequencies, and in each
+    statistic. Time is left out: an effect that comes and goes is another finding.
+
+    Args:
+        comparison: The recording.
+        trust: Noise of each channel.
+        without: Simulation without the named effects.
+        corrected: Simulation with them.
+
+    Returns:
+        Noise-whitened differences, each of one standard deviation, shape (k, m).
+    """
+    n = comparison.coefficients
+    sizes = [n] * len(comparison.channels)
+    sizes += [comparison.measured.statistics[c.name].size for c in comparison.channels]
+    starts = np.concatenate(([0], np.cumsum(sizes)))
+    frequency = spectra.cosine_frequencies(comparison.grid.n, comparison.grid.dt)[:n]
+    rows: list[FloatArray] = []
+
+    def add(place: int, values: FloatArray) -> None:
+        if float(values @ values) < 1e-2:
+            return
+        row = np.zeros(starts[-1])
+        row[starts[place] : starts[place + 1]] = FORM_ERROR * values
+        rows.append(row)
+
+    for k, channel in enumerate(comparison.channels):
+        name = channel.name
+        t = trust[name]
+        scale = t.slope / t.deviation
+        change = corrected.series[name] - without.series[name]
+        if np.any(change):
+            for weight in _wind_parts(comparison):
+                part = spectra.to_cosine(comparison.masked(change * weight))[:n]
+                add(k, scale * part)
+            whole = scale * (corrected.cosine[name] - without.cosine[name])
+            for low, high in itertools.pairwise(_FORM_BANDS):
+                add(k, np.where((frequency >= low) & (frequency < high), whole, 0.0))
+        shift = np.nan_to_num(
+            (corrected.statistics[name] - without.statistics[name]) / t.statistics_deviation
+        )
+        for j in np.flatnonzero(shift):
+            add(len(comparison.channels) + k, np.where(np.arange(shift.size) == j, shift, 0.0))
+    return np.array(rows) if rows else np.zeros((0, int(starts[-1])))
+
+
+def _wind_parts(comparison: Comparison) -> list[FloatArray]:
+    """Smooth weights over the wind's speed and direction, shape (n,) each."""
+    rank = np.argsort(np.argsort(comparison.speed)) / max(comparison.grid.n - 1, 1)
+    thirds = [np.clip(1.0 - np.abs(3.0 * rank - middle), 0.0, 1.0) for middle in (0.0, 1.5, 3.0)]
+    heading = comparison.wind_from
+    return [*thirds, np.cos(heading), np.sin(heading), np.cos(2.0 * heading),
+            np.sin(2.0 * heading)]  # fmt: skip
 
 
 def unstanding(comparison: Comparison, trust: Mapping[str, Trust]) -> Whitener:

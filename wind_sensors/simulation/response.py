@@ -337,6 +337,12 @@ class _Worker:
             parameters, axial, transverse, lateral, self._density_ratio(rotor.reference_density),
             temperature, self._drive.dt, self._nodes[rotor.name], rate * length, psi,
         )  # fmt: skip
+        if not np.isfinite(y[-1]):
+            raise UserError(
+                f"'{rotor.name}' runs away: its torque grows with its rate.",
+                f"instruments.{rotor.name}.a4",
+                "Give a coefficient a4 of at most one.",
+            )
         self.rotors[rotor.name] = (y, turned, length)
 
 

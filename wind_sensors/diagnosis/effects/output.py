@@ -40,7 +40,7 @@ def _missed(entry: Entry, values: Values) -> dict[str, Any]:
 
 
 def _missed_size(values: Values) -> float:
-    return max(values["dead_time"] / 0.004, values["loss_probability"] / 0.01)
+    return max(values["dead_time"] / 0.001, values["loss_probability"] / 0.01)
 
 
 MISSED_PULSES = Effect(
@@ -53,7 +53,7 @@ MISSED_PULSES = Effect(
     region="high rotor rates; doubled pulse intervals",
     standing=0.0,
     parameters=(
-        Parameter("dead_time", "s", 0.0, 0.5, minimum=0.004, step=0.0005),
+        Parameter("dead_time", "s", 0.0, 0.5, minimum=0.001, step=0.0005),
         Parameter("loss_probability", "1", 0.0, 0.9, minimum=0.01, step=0.003),
     ),
     applies=_is_rotor,
@@ -181,7 +181,7 @@ TIMESTAMP_LATENCY = Effect(
     region="phase of the cross-spectrum, in proportion to frequency",
     smooths=True,
     parameters=(
-        Parameter("latency", "s", -60.0, 60.0, minimum=0.15, step=0.05, starts=(0.3, 1.0, -0.5)),
+        Parameter("latency", "s", -60.0, 60.0, minimum=0.1, step=0.05, starts=(0.3, 1.0, -0.5)),
     ),
     applies=_is_sensor,
     update=_latency,

@@ -273,7 +273,7 @@ ICING = Effect(
         "calibration_drift": "temperature; look at the cups",
         "bearing_friction": "temperature; a run-down test by hand",
     },
-    size=lambda v: min(abs(v["gain"] - 1.0) / 0.03, abs(v["inertia_factor"] - 1.0) / 0.3),
+    size=lambda v: min(abs(v["gain"] - 1.0) / 0.012, abs(v["inertia_factor"] - 1.0) / 0.3),
 )
 
 

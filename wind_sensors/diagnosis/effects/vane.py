@@ -214,7 +214,7 @@ POTENTIOMETER_GAP = Effect(
     standing=0.0,
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),
-        Parameter("width", "deg", 0.0, 90.0, minimum=5.0, step=1.0, starts=(10.0, 20.0)),
+        Parameter("width", "deg", 0.0, 90.0, minimum=4.0, step=1.0, starts=(10.0, 20.0)),
     ),
     applies=_is_vane,
     update=_gap,
@@ -237,7 +237,7 @@ QUANTISATION = Effect(
     region="all, in the histogram of the readings",
     standing=0.0,
     parameters=(
-        Parameter("step", "deg", 0.0, 95.0, minimum=4.0, step=0.5, starts=(5.0, 11.25, 22.5)),
+        Parameter("step", "deg", 0.0, 95.0, minimum=2.0, step=0.5, starts=(5.0, 11.25, 22.5)),
     ),
     applies=_is_vane,
     update=_quantisation,

@@ -10,12 +10,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.fitting import ALWAYS, Term
 from wind_sensors.diagnosis.regions import Found
-from wind_sensors.diagnosis.verdict import (
-    REMAINDER_SCORE,
-    REMAINDER_SCORES,
-    Diagnosis,
-    diagnose,
-)
+from wind_sensors.diagnosis.verdict import REMAINDER_SCORES, Diagnosis, diagnose
 from wind_sensors.diagnosis.watch.believing import Rival, believed
 from wind_sensors.diagnosis.watch.finding import Located
 from wind_sensors.diagnosis.watch.naming import Candidate
@@ -25,6 +20,9 @@ from wind_sensors.station.signals import Recording
 FloatArray = npt.NDArray[np.float64]
 
 _SECOND = 1_000_000_000
+
+_UNKNOWN_STRENGTH = 30.0
+"""Strength of a mismatch without a name that just counts as structure."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,8 @@ def look(recording: Recording, baseline: Baseline) -> Look:
     if diagnosis.verdict == "unknown":
         found = max(diagnosis.unexplained.regions, key=_beyond)
         where = _located(diagnosis, found, ALWAYS)
-        return Look(start, recording.stop, REMAINDER_SCORE * _beyond(found), start, None, where)
+        strength = _UNKNOWN_STRENGTH * _beyond(found)
+        return Look(start, recording.stop, strength, start, None, where)
     if diagnosis.verdict not in {"named", "ambiguous"}:
         return nothing
     terms = diagnosis.naming.fit.terms
@@ -88,7 +87,7 @@ def look(recording: Recording, baseline: Baseline) -> Look:
 
 def _beyond(found: Found) -> float:
     """Score of a region relative to that from which it counts as structure."""
-    return found.score / REMAINDER_SCORES.get(found.region.kind, REMAINDER_SCORE)
+    return found.score / REMAINDER_SCORES[found.region.kind]
 
 
 def _candidates(diagnosis: Diagnosis) -> tuple[Candidate, ...]:

@@ -32,6 +32,9 @@ PROPELLER_JACKSON = 2
 PROPELLER_KRISTENSEN_1994 = 3
 """Propeller of Kristensen (1994), (30)."""
 
+RUNAWAY_SPEED = 500.0
+"""No wind turns a rotor faster than this [m/s]; an equation that does has no steady state."""
+
 RESPONSE_TABLE_SIZE = 181
 """Angular response tables hold f(theta) at 0, 1, ..., 180 degrees."""
 
@@ -243,8 +246,11 @@ def advance_forced(
             wind [rad] at start and end.
 
     Returns:
-        y [m/s] and psi [rad] at the end.
+        y [m/s] and psi [rad] at the end; NaN if the rotor runs away, which the quadratic torque
+        allows for a4 above one once a rotor turns too fast.
     """
+    if not abs(y) < RUNAWAY_SPEED:
+        return math.nan, math.nan
     a_0, b_0, e_0, lateral_0 = start
     a_1, b_1, e_1, lateral_1 = stop
     fastest = density_ratio * max(abs(b_0), abs(b_1), abs(a_0), abs(a_1), abs(y))
@@ -288,4 +294,6 @@ def advance_forced(
         if p.form != PROPELLER_JACKSON and y_next < 0.0:
             y_next = 0.0
         y = y_next
+        if not abs(y) < RUNAWAY_SPEED:
+            return math.nan, math.nan
     return y, psi

@@ -1,0 +1,141 @@
+"""Explanations of a recording: what they cost, what they must bring, what a naming holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.effects.definition import Parameter
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term
+from wind_sensors.diagnosis.search import (
+    PENALTY_PER_FURTHER_PARAMETER,
+    PENALTY_PER_INTERVAL,
+    PENALTY_PER_PARAMETER,
+    Searcher,
+)
+from wind_sensors.diagnosis.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
+
+ACCEPTED_GAIN = 14.0
+"""Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
+
+LOUDEST_FACTOR = 1.3
+"""A name needs this many times what the loudest healthy recording promises."""
+
+ACCEPTED_FURTHER_GAIN = 22.0
+"""The same for a second and a third effect."""
+
+FURTHER_SHARE = 0.05
+"""A further effect must also bring this share of the gain so far."""
+
+SMALLEST_SIZE = 0.7
+"""In units of the smallest size worth reporting."""
+
+
+def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
+    """What parameters and intervals cost; a term's second parameter costs more than its first."""
+    firsts = min(len(terms), parameters)
+    cost = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
+    for term in terms:
+        if term.interval != ALWAYS:
+            cost += PENALTY_PER_INTERVAL * sum(
+                (term.interval[0] > 0.0, term.interval[1] is not None)
+            )
+    return cost
+
+
+def needed_gain(current: Fit, nothing: float, loudest: float) -> float:
+    """Gain that the next term has to bring.
+
+    After a large effect the simulation's own inexactness is worth a share of its gain.
+
+    Args:
+        current: The explanation so far.
+        nothing: Cost without any effect.
+        loudest: Largest gain in a healthy recording judged by the others.
+    """
+    if not current.terms:
+        return max(ACCEPTED_GAIN, LOUDEST_FACTOR * loudest)
+    return max(ACCEPTED_FURTHER_GAIN, FURTHER_SHARE * (nothing - current.cost))
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """An explanation that lost.
+
+    Attributes:
+        fit: Its fit.
+        behind: How far its penalised cost lies above the winner's.
+    """
+
+    fit: Fit
+    behind: float
+
+
+@dataclass(frozen=True)
+class Naming:
+    """The explanation of a recording.
+
+    Attributes:
+        fit: Named terms, fitted; no terms: nothing was accepted.
+        whitener: The null in which the fit was made.
+        adequate: The null in which the named effects need not have the simulation's exact form.
+        nothing: White vector without any effect, in that null.
+        gain: Drop of the cost.
+        alternatives: Losers of the last round, for each accepted term, nearest first.
+        screened: Best scores of the first screening: effect, instrument, gain.
+    """
+
+    fit: Fit
+    whitener: Whitener
+    adequate: Whitener
+    nothing: FloatArray
+    gain: float
+    alternatives: tuple[Alternative, ...] = ()
+    screened: tuple[tuple[str, str, float], ...] = field(default=())
+
+
+def no_terms(whitener: Whitener, searcher: Searcher) -> Fit:
+    vector = whitener.of(searcher.bank.without)
+    return Fit((), float(vector @ vector), vector, searcher.bank.without, np.zeros((0, 0)), 0)
+
+
+def seen_in(whitener: Whitener, current: Fit) -> Fit:
+    """The same fit with its vector and cost in another null."""
+    vector = whitener.of(current.simulated)
+    return replace(current, vector=vector, cost=float(vector @ vector))
+
+
+def total(candidate: Fit) -> float:
+    return candidate.cost + parameter_cost(candidate.terms, candidate.active)
+
+
+def value_at(term: Term, parameter: Parameter) -> float:
+    """Fitted value of a parameter."""
+    return float(term.values[parameter.name])
+
+
+def plausible(candidate: Fit) -> bool:
+    """Whether the newest term is large enough to matter and its parameters are determined.
+
+    A search that ran into the bounds of a parameter has found the wrong effect.
+    """
+    term = candidate.terms[-1]
+    if term.relative_size < SMALLEST_SIZE:
+        return False
+    for parameter in term.effect.parameters:
+        if parameter.healthy is None or parameter.minimum <= 0.0:
+            continue
+        margin = 0.02 * (parameter.high - parameter.low)
+        reach = 0.85 * (parameter.high - 1.0)
+        if parameter.healthy == 1.0 and value_at(term, parameter) > 1.0 + reach:
+            return False
+        value = term.values[parameter.name]
+        at_bound = value < parameter.low + margin or value > parameter.high - margin
+        if at_bound and abs(value - parameter.healthy) > margin:
+            return False
+    return True

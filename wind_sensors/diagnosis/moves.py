@@ -1,0 +1,105 @@
+"""Moves that remove, replace or merge the terms of an explanation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
+from wind_sensors.diagnosis.explanation import (
+    ACCEPTED_FURTHER_GAIN,
+    ACCEPTED_GAIN,
+    FURTHER_SHARE,
+    SMALLEST_SIZE,
+    Alternative,
+    no_terms,
+    plausible,
+    total,
+)
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.search import Searcher
+from wind_sensors.diagnosis.whitening import Whitener
+
+MERGE_CANDIDATES = 12
+SWAP_CANDIDATES = 4
+SWAP_GAIN = 1.0
+
+
+def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit without terms that later ones made superfluous."""
+    while len(current.terms) > 1:
+        without = [
+            fit(
+                whitener, searcher.station,
+                [t for j, t in enumerate(current.terms) if j != k], searcher.bank.without,
+            )
+            for k in range(len(current.terms))
+        ]  # fmt: skip
+        best = min(without, key=total)
+        if total(best) - total(current) > ACCEPTED_GAIN and all(
+            t.relative_size >= SMALLEST_SIZE for t in current.terms
+        ):
+            break
+        current = best
+    return current
+
+
+def merged(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    singles: Sequence[Sequence[Term]],
+) -> Fit:
+    """One effect in the place of several, where it does nearly as well.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation by several effects.
+        singles: Single effects that did well in the beginning.
+    """
+    instruments = [t.instrument for t in current.terms]
+    crowded = {name for name in instruments if instruments.count(name) > 1}
+    crowded |= {STATION, PLATFORM}
+    nothing = no_terms(whitener, searcher)
+    known = {terms[0].key for terms in singles}
+    more = [
+        (starts[0],)
+        for starts in searcher.single_candidates(whitener, nothing.vector, MERGE_CANDIDATES)
+        if starts[0].key not in known
+    ]
+    intervals = {ALWAYS, *(t.interval for t in current.terms)}
+    candidates = [
+        [replace(terms[0], interval=interval)]
+        for terms in (*singles, *more)
+        if terms[0].instrument in crowded
+        for interval in intervals
+    ]
+    fits = searcher.refit_all(whitener, candidates)
+    best = min((f for f in fits if plausible(f)), key=total, default=current)
+    margin = ACCEPTED_FURTHER_GAIN + FURTHER_SHARE * (nothing.cost - current.cost)
+    return best if total(best) < total(current) + margin else current
+
+
+def swapped(
+    searcher: Searcher, whitener: Whitener, current: Fit
+) -> tuple[Fit, tuple[Alternative, ...]]:
+    """The explanation with single terms exchanged for better ones, and those that come close."""
+    losers: list[Fit] = []
+    for k in range(len(current.terms)):
+        others = [t for j, t in enumerate(current.terms) if j != k]
+        without = fit(whitener, searcher.station, others, searcher.bank.without, iterations=3)
+        used = {t.key for t in current.terms}
+        candidates = [
+            starts
+            for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
+            if starts[0].key not in used
+        ]
+        rivals = searcher.fit_all(whitener, without.terms, candidates)
+        losers.extend(f for f in rivals if plausible(f))
+        best = min((f for f in rivals if plausible(f)), key=total, default=current)
+        if total(best) < total(current) - SWAP_GAIN:
+            losers.append(current)
+            current = best
+    behind = [Alternative(f, total(f) - total(current)) for f in losers if f is not current]
+    return current, tuple(sorted(behind, key=lambda a: a.behind))
