@@ -248,15 +248,13 @@ class Watch:
         session = self._session
         if not self.station.changes:
             session = max(session, start - DRIFT_SPAN)
-        measured = self._estimator is None
-        known = self._store.wind_on_grid(start - lead, stop)
         recording = self._store.recording(
-            self.station, session, start - lead, stop, self.settings.driving, gridded=not measured
+            self.station, session, start - lead, stop, self.settings.driving
         )
-        if known is None or recording is None:
+        if recording is None or recording.reference is None:
             self._skip("no wind to compare with")
             return None
-        if known.time.size < _LEAST_SEEN * (stop - start) / GRID_STEP:
+        if recording.reference.time.size < _LEAST_SEEN * (stop - start) / GRID_STEP:
             self._skip("too little wind to compare with")
             return None
         try:
