@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,9 @@ _SECOND = 1_000_000_000
 
 _UNKNOWN_STRENGTH = 30.0
 """Strength of a mismatch without a name that just counts as structure."""
+
+_MOST_LEFT = 0.35
+"""Share of the mismatch that effects may leave and still be told as candidates."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +68,9 @@ def look(recording: Recording, baseline: Baseline) -> Look:
     if diagnosis.verdict == "unknown":
         found = max(diagnosis.unexplained.regions, key=_beyond)
         where = _located(diagnosis, found, ALWAYS)
-        strength = _UNKNOWN_STRENGTH * _beyond(found)
-        return Look(start, recording.stop, strength, start, None, where)
+        doubtful = _doubtful(diagnosis)
+        strength = diagnosis.naming.gain if doubtful else _UNKNOWN_STRENGTH * _beyond(found)
+        return Look(start, recording.stop, strength, start, None, where, doubtful)
     if diagnosis.verdict not in {"named", "ambiguous"}:
         return nothing
     terms = diagnosis.naming.fit.terms
@@ -88,6 +92,13 @@ def look(recording: Recording, baseline: Baseline) -> Look:
 def _beyond(found: Found) -> float:
     """Score of a region relative to that from which it counts as structure."""
     return found.score / REMAINDER_SCORES[found.region.kind]
+
+
+def _doubtful(diagnosis: Diagnosis) -> tuple[Candidate, ...]:
+    """Effects that explain most of what is there, but leave too much for a name: half believed."""
+    if not diagnosis.naming.fit.terms or diagnosis.unexplained.share > _MOST_LEFT:
+        return ()
+    return tuple(replace(c, weight=0.5 * c.weight) for c in _candidates(diagnosis))
 
 
 def _candidates(diagnosis: Diagnosis) -> tuple[Candidate, ...]:
