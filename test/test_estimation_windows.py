@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from estimation_cases import blown, mast, truth_at
@@ -52,6 +54,34 @@ def test_the_corrected_mean_is_closer_to_the_truth_than_the_raw_one() -> None:
     assert abs(window.scalar_mean - true_speed) < 3.0 * window.scalar_mean_uncertainty
     predicted = window.bias_terms["u"].value
     assert raw == pytest.approx(predicted, abs=0.6 * raw)
+
+
+def test_the_wind_run_is_counted_with_what_is_known_of_the_count_and_the_calibration() -> None:
+    wrong = {"calibration_gain": 0.9, "electronics": {"dead_time": 0.035}}
+    recording = blown(mast(wrong), duration=60.0)
+    stated = process(recording, EstimatorSettings(window=100.0)).windows[0]
+    unaware = replace(recording, station=mast())
+    plain = process(unaware, EstimatorSettings(window=100.0)).windows[0]
+    true = np.hypot(*truth_at(recording, recording.angles["vane"].time)[:, :2].T).mean()
+    assert stated.raw_scalar_mean == pytest.approx(true, rel=0.03)
+    assert np.hypot(*stated.wind_run_mean) == pytest.approx(true, rel=0.03)
+    assert plain.raw_scalar_mean < 0.6 * true
+
+
+def test_an_error_of_a_wake_does_not_average_out() -> None:
+    shadow = {"bearing_from_deg": 203.0, "depth": 0.25, "width_deg": 30.0}
+    healthy, wake = (
+        process(blown(mast(cup), duration=60.0), EstimatorSettings(window=100.0))
+        for cup in ({}, {"wake_shadows": [shadow]})
+    )
+    speed = np.hypot(*wake.windows[0].vector_mean[:2])
+    # A fifth of the deficit, relative to the speed that is left of it.
+    expected = (0.2 * 0.25 / 0.75 * speed) ** 2
+    spread = [p.covariance[300:, :2, :2].mean(axis=0) for p in (healthy, wake)]
+    gained = np.trace(spread[1] - spread[0])
+    assert gained == pytest.approx(expected, rel=0.25)
+    means = [np.trace(p.windows[0].vector_mean_covariance[:2, :2]) for p in (healthy, wake)]
+    assert means[1] - means[0] > 0.7 * expected
 
 
 def test_direction_variance_is_corrected_towards_the_truth() -> None:

@@ -35,7 +35,6 @@ class ArrayRunCounter:
     Attributes:
         rotor: The first propeller.
         vane: None.
-        starting_speed: 0 [m/s].
     """
 
     def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
@@ -49,7 +48,6 @@ class ArrayRunCounter:
         self._sums: dict[int, RunSums] = {}
         self.rotor = self._propellers[0]
         self.vane = None
-        self.starting_speed = 0.0
 
     def take(self, block: Block) -> None:
         """Add a block."""
@@ -78,7 +76,9 @@ class ArrayRunCounter:
         self._angle[i] = float(angle[-1])
         rows = self._source.at(times, np.zeros(3))
         to_earth = rows[:, MOUNT_ROTATION : MOUNT_ROTATION + 9].reshape(-1, 3, 3)
-        scale = self._propellers[i].calibration_distance / self.rotor.calibration_distance
+        propeller = self._propellers[i]
+        scale = propeller.calibration_distance / self.rotor.calibration_distance
+        scale /= propeller.calibration_gain
         runs = scale * turned[:, np.newaxis] * (to_earth @ self._columns[:, i])[:, :2]
         for sums, part in self._windows(times):
             sums.edges += int(np.count_nonzero(part))

@@ -101,7 +101,7 @@ def instruments_of(station: Station) -> Instruments:
     every: tuple[Instrument, ...] = (*rotors, *(a.instrument for a in axes))
     count = len(every)
     most = max([len(i.wake_shadows) for i in every], default=0)
-    shadow = np.zeros((count, max(most, 1), 3))
+    shadow = np.zeros((count, max(most, 1), 4))
     shadow[:, :, 2] = 1.0
     distortion = np.zeros((count, 5))
     lean = np.zeros((count, 3, 3))
@@ -109,7 +109,7 @@ def instruments_of(station: Station) -> Instruments:
     for k, instrument in enumerate(every):
         for j, wake in enumerate(instrument.wake_shadows):
             centre, width = np.radians((wake.bearing_from_deg, wake.width_deg))
-            shadow[k, j] = centre, wake.depth, width
+            shadow[k, j] = centre, wake.depth, width, wake.flank
         d = instrument.flow_distortion
         distortion[k] = d.cosine_1, d.sine_1, d.cosine_2, d.sine_2, d.deflection
         tilt = instrument.tilt_deg

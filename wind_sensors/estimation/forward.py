@@ -20,6 +20,7 @@ from wind_sensors.instruments.dynamics.rotor import (
     rotor_forcing,
 )
 from wind_sensors.instruments.dynamics.vane import VaneParameters, advance_vane, propeller_axes
+from wind_sensors.instruments.dynamics.wake import wake_factor
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -60,7 +61,7 @@ class Instruments(NamedTuple):
         vane_density: Reference densities [kg/m^3], shape (vanes,).
         azimuth: For the elevation of a bivane the index of its azimuth, else -1; shape (vanes,).
         shadow: Wake shadows of rotors then vanes: bearing of its middle against x [rad], depth,
-            width [rad]; shape (rotors + vanes, shadows, 3).
+            width [rad], flank; shape (rotors + vanes, shadows, 4).
         distortion: cos, sin, cos 2, sin 2 of the speed-up, deflection; shape
             (rotors + vanes, 5).
         lean: Matrices that turn instrument axes into sensor axes, shape (rotors + vanes, 3, 3).
@@ -147,12 +148,10 @@ def at_instrument(
     factor = 1.0
     bearing = math.atan2(-y, -x)
     for k in range(s.shadow.shape[1]):
-        depth = s.shadow[which, k, 1]
-        if depth != 0.0:
-            off = bearing - s.shadow[which, k, 0]
-            off -= 2.0 * math.pi * math.floor((off + math.pi) / (2.0 * math.pi))
-            off /= s.shadow[which, k, 2]
-            factor *= 1.0 - depth * math.exp(-0.5 * off * off)
+        off = bearing - s.shadow[which, k, 0]
+        factor *= wake_factor(
+            off, s.shadow[which, k, 1], s.shadow[which, k, 2], s.shadow[which, k, 3]
+        )
     d = s.distortion[which]
     c_1, s_1 = math.cos(bearing), math.sin(bearing)
     c_2, s_2 = c_1 * c_1 - s_1 * s_1, 2.0 * c_1 * s_1

@@ -12,6 +12,8 @@ from wind_sensors.estimation.forward import (
     AIR_DENSITY,
     AIR_TEMPERATURE,
     CREEP,
+    MOUNT_ROTATION,
+    MOUNT_VELOCITY,
     Instruments,
     at_instrument,
     gravity,
@@ -35,6 +37,8 @@ TimeArray = npt.NDArray[np.int64]
 
 _FEWEST = 5
 """A fit reaches as far as it must to have so many points."""
+_LEAST_UPRIGHT = 0.5
+"""Cosine of the lean beyond which a mount's vertical wind is no longer followed."""
 _ROUNDS = 12
 _FASTEST = 150.0
 """[m/s]"""
@@ -215,26 +219,45 @@ def _shown(
 
 
 @compiled
+def _along(
+    speed: float, heading: float, rise: float, with_lift: bool, c: FloatArray
+) -> tuple[float, float, float]:
+    """Wind in sensor axes [m/s] from its heading and its speed across the sensor's z axis.
+
+    With a lift it rises by that angle, else it is level with the ground: a mount that leans, heaves
+    or blows feels it from below or above.
+    """
+    x, y = -speed * math.cos(heading), -speed * math.sin(heading)
+    if with_lift:
+        return x, y, speed * math.tan(rise)
+    upright = c[MOUNT_ROTATION + 8]
+    level = -(c[MOUNT_ROTATION + 6] * x + c[MOUNT_ROTATION + 7] * y + c[MOUNT_VELOCITY + 2])
+    return x, y, level / max(upright, _LEAST_UPRIGHT)
+
+
+@compiled
 def wind_from_motion(
     s: Instruments,
     which: tuple[int, int],
     rotor: tuple[float, float],
     nose: tuple[float, float, float],
     lift: tuple[float, float, float],
+    with_lift: bool,
     c: FloatArray,
 ) -> tuple[float, float, float]:
     """Wind in sensor axes [m/s] that gives a rotor and a vane their motion.
 
     What the site does to the wind at each of them (wakes, speed-up and deflection, leaning axes)
     depends on the wind itself: from a first guess the wind is scaled and turned until both
-    instruments feel what they show. Without a bivane the vertical wind is taken as zero.
+    instruments feel what they show. Without a bivane the wind is taken as level with the ground.
 
     Args:
         s: The station.
         which: Indices of the rotor and of the nose axis.
         rotor: y = l s [m/s] and its rate [m/s^2].
         nose: Heading [rad], rate, acceleration of the nose.
-        lift: The same of a bivane's elevation, zero for a vane.
+        lift: The same of a bivane's elevation.
+        with_lift: Whether there is a bivane.
         c: Circumstances.
     """
     i, v = which
@@ -251,7 +274,7 @@ def wind_from_motion(
     heading = phi
     rise = 0.0
     for _ in range(_ROUNDS):
-        wind = (-speed * math.cos(heading), -speed * math.sin(heading), speed * math.tan(rise))
+        wind = _along(speed, heading, rise, with_lift, c)
         at_vane = at_instrument(s, rotors + v, wind)
         h = math.hypot(at_vane[0], at_vane[1])
         wanted = wind_heading_from_motion(
@@ -259,7 +282,7 @@ def wind_from_motion(
         )
         off = wanted - math.atan2(-at_vane[1], -at_vane[0])
         off -= 2.0 * math.pi * math.floor((off + math.pi) / (2.0 * math.pi))
-        if lift[0] != 0.0 or lift[1] != 0.0:
+        if with_lift:
             pitching = turn[1] * math.cos(phi) - turn[0] * math.sin(phi)
             down = (pull[0] * math.cos(phi) + pull[1] * math.sin(phi), -pull[2], 0.0)
             rise = wind_heading_from_motion(
@@ -275,4 +298,4 @@ def wind_from_motion(
         heading += off
         if abs(off) < 1e-7 and abs(ratio - 1.0) < 1e-7:
             break
-    return -speed * math.cos(heading), -speed * math.sin(heading), speed * math.tan(rise)
+    return _along(speed, heading, rise, with_lift, c)

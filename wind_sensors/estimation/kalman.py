@@ -46,7 +46,7 @@ from wind_sensors.estimation.readings import NoseReader
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.site import with_site_covariance
 from wind_sensors.estimation.smoother_kernel import smooth
-from wind_sensors.estimation.start import start_filter
+from wind_sensors.estimation.start import slots_in_place, start_filter
 from wind_sensors.estimation.timeline import Timeline
 from wind_sensors.estimation.turbulence_process import (
     UNRESOLVED_VARIANCE,
@@ -188,7 +188,7 @@ class KalmanCore:
 
     def _start(self, blocks: list[Block]) -> None:
         first = blocks[0].start
-        self._state_stated_slot_errors()
+        self._state_stated_slot_errors(blocks)
         row = self._source.at(np.array([first], dtype=np.int64), np.zeros(3))[0]
         start_filter(
             self.filter, self._instruments, self._rotors, self._axes, blocks, row,
@@ -196,11 +196,13 @@ class KalmanCore:
         )  # fmt: skip
         self._started = True
 
-    def _state_stated_slot_errors(self) -> None:
+    def _state_stated_slot_errors(self, blocks: list[Block]) -> None:
         for i, rotor in enumerate(self._rotors):
             errors = rotor.electronics.slot_errors
             if errors and len(errors) == self.filter.slots[i]:
-                self.filter.slot_error[i, : len(errors)] = np.array(errors) - np.mean(errors)
+                times = np.concatenate([b.pulses[rotor.name].time for b in blocks])
+                centred = np.array(errors) - np.mean(errors)
+                self.filter.slot_error[i, : len(errors)] = slots_in_place(centred, times)
 
     def _events(self, block: Block) -> Events:
         """Everything that happens in a block, in the one order that all runs share."""

@@ -6,12 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.core import Estimates
+from wind_sensors.instruments.dynamics.wake import wake_factor
 from wind_sensors.station.model import Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
 
 WAKE_UNCERTAINTY = 0.2
-"""Relative standard uncertainty of a wake's deficit at any bearing: no wake is quite Gaussian."""
+"""Relative standard uncertainty of a wake's deficit at any bearing: none has quite this shape."""
 
 
 def wake_deviation(station: Station, apparent: FloatArray) -> FloatArray:
@@ -33,10 +34,11 @@ def wake_deviation(station: Station, apparent: FloatArray) -> FloatArray:
         lost = np.zeros(apparent.shape[0])
         for wake in rotor.wake_shadows:
             off = bearing - np.radians(wake.bearing_from_deg)
-            off -= 2.0 * np.pi * np.floor((off + np.pi) / (2.0 * np.pi))
-            deficit = wake.depth * np.exp(-0.5 * np.square(off / np.radians(wake.width_deg)))
-            factor *= 1.0 - deficit
-            lost = np.hypot(lost, deficit)
+            left = np.array(
+                [wake_factor(a, wake.depth, np.radians(wake.width_deg), wake.flank) for a in off]
+            )
+            factor *= left
+            lost = np.hypot(lost, 1.0 - left)
         deviation = WAKE_UNCERTAINTY * lost / np.maximum(factor, 0.05)
         best = deviation if best is None else np.minimum(best, deviation)
     return np.zeros(apparent.shape[0]) if best is None else best

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.circumstances import CircumstanceSource
+from wind_sensors.estimation.constants import rotors_of
 from wind_sensors.estimation.forward import MOUNT_ROTATION
 from wind_sensors.estimation.history import History
 from wind_sensors.estimation.intake import Block, merged
@@ -26,11 +27,12 @@ class RunSums:
     """Sums over one window.
 
     Attributes:
-        turned: Angle turned by the rotor [rad].
+        turned: Angle that a rotor true to its calibration would have turned [rad].
         edges: Edges or counter readings.
         directions: Sum of the air's unit vector, weighted by angle turned [rad], shape (2,).
         readings: Number of vane readings.
-        time_directions: Sum of the air's unit vector over the readings, shape (2,).
+        offsets: Sum over the readings of the speed at which the rotor would stand still [m/s].
+        time_directions: Sum over the readings of that speed along the air's direction, shape (2,).
         rates, intervals, interval_time, interval_turned: Sum of the rotor's rates over the
             intervals between edges [rad/s], their number, duration [s] and angle [rad]; for the
             arithmetic mean.
@@ -41,6 +43,7 @@ class RunSums:
     edges: int = 0
     directions: FloatArray = field(default_factory=lambda: np.zeros(2))
     readings: int = 0
+    offsets: float = 0.0
     time_directions: FloatArray = field(default_factory=lambda: np.zeros(2))
     rates: float = 0.0
     intervals: int = 0
@@ -51,6 +54,8 @@ class RunSums:
 
 class RunCounter:
     """Sorts messages into windows that follow one another and keeps their sums.
+
+    What is known of the count and of the steady calibration is undone: lost edges, gain, offset.
 
     Args:
         station: The station; the first rotor and the vane that belongs to it are used.
@@ -68,6 +73,10 @@ class RunCounter:
         self.rotor = self.history.rotor
         self.vane = self.history.vane
         self._timeline = Timeline(station, start)
+        self._rotors = [
+            next(r for r in rotors_of(s) if r.name == self.rotor.name)
+            for s in self._timeline.stations
+        ]
         self._source = CircumstanceSource(self._timeline.stations[0], use_air)
         self._start = start
         self._length = length
@@ -75,11 +84,6 @@ class RunCounter:
         self._last_angle = 0.0
         self._sums: dict[int, RunSums] = {}
         self._pending: list[Block] = []
-
-    @property
-    def starting_speed(self) -> float:
-        """Calibration offset [m/s]."""
-        return self.rotor.starting_speed if isinstance(self.rotor, Cup) else 0.0
 
     def take(self, block: Block) -> None:
         """Add a block; some are kept and summed together."""
@@ -91,6 +95,16 @@ class RunCounter:
         """Sums of a window, which is forgotten."""
         self._sum_up()
         return self._sums.pop(number, RunSums())
+
+    def _calibration(self, times: TimeArray) -> tuple[FloatArray, FloatArray]:
+        """Gain, and the speed at which the rotor would stand still [m/s], shape (n,) each."""
+        gain, offset = np.ones(times.size), np.zeros(times.size)
+        for number, here in self._timeline.parts(times):
+            rotor = self._rotors[number]
+            gain[here] = rotor.calibration_gain
+            lost = rotor.starting_speed if isinstance(rotor, Cup) else 0.0
+            offset[here] = (lost - rotor.calibration_offset) / rotor.calibration_gain
+        return gain, offset
 
     def _directions(self, times: TimeArray, heading: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Unit vector of the air in ENU (horizontal part) and the mount's velocity, (n, 2) each."""
@@ -111,9 +125,11 @@ class RunCounter:
         if readings:
             times, heading = h.nose.time[-readings:], h.nose.angle[-readings:]
             unit, carried = self._directions(times, heading)
+            _, offset = self._calibration(times)
             for sums, part in self._windows(times):
                 sums.readings += int(np.count_nonzero(part))
-                sums.time_directions += unit[part].sum(axis=0)
+                sums.offsets += float(offset[part].sum())
+                sums.time_directions += (offset[part, np.newaxis] * unit[part]).sum(axis=0)
                 sums.carried += carried[part].sum(axis=0)
         if edges and h.nose.time.size:
             self._sum_edges(h.edges.time[-edges:], h.edges.angle[-edges:])
@@ -126,6 +142,7 @@ class RunCounter:
         turned = np.diff(angle, prepend=self._last_angle)
         dt = np.diff(times, prepend=self._last_time) * 1e-9
         self._last_time, self._last_angle = int(times[-1]), float(angle[-1])
+        turned = turned / self._calibration(times)[0]
         unit, _ = self._directions(times, np.interp(times, h.nose.time, h.nose.angle))
         for sums, part in self._windows(times):
             sums.edges += int(np.count_nonzero(part))

@@ -20,6 +20,7 @@ from wind_sensors.estimation.core import Estimates, SmallScales
 from wind_sensors.estimation.intake import Block
 from wind_sensors.estimation.outputs import WindowStatistics
 from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.site import has_wakes, site_covariance
 from wind_sensors.estimation.wind_run import RunCounter, RunSums
 from wind_sensors.station.model import Station
 
@@ -121,6 +122,9 @@ class WindowAccumulator:
         s.covariance += p.sum(axis=0)
         own = estimates.apparent_covariance[part]
         turn = estimates.to_earth[part]
+        if has_wakes(self._station):
+            # An error in a wake's depth stays while the wind stays in the wake.
+            own = own - site_covariance(self._station, estimates.apparent[part])
         s.own_trace += float(np.trace(own, axis1=1, axis2=2).sum())
         s.mount += (p - turn @ own @ turn.transpose(0, 2, 1)).sum(axis=0)
         s.speed += float(np.sum(h + 0.5 * across / safe))
@@ -169,7 +173,7 @@ class WindowAccumulator:
         arithmetic = 0.0
         if run.intervals and run.interval_turned > 0.0:
             mean_rate = run.interval_turned / run.interval_time
-            offset = self._counter.starting_speed / length
+            offset = run.offsets / max(run.readings, 1) / length
             arithmetic = (run.rates / run.intervals + offset) / (mean_rate + offset) - 1.0
         covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
         if vane is None:
@@ -210,11 +214,11 @@ class WindowAccumulator:
         """Vector mean by wind run (K94 (83)) and count mean [m/s], by the calibration."""
         assert self._counter is not None
         length = self._counter.rotor.calibration_distance
-        offset = self._counter.starting_speed if run.edges else 0.0
         readings = max(run.readings, 1)
+        moving = 1.0 if run.edges else 0.0
         vector = length * run.directions / duration
-        vector = vector + (offset * run.time_directions + run.carried) / readings
-        return vector, length * run.turned / duration + offset
+        vector = vector + (moving * run.time_directions + run.carried) / readings
+        return vector, length * run.turned / duration + moving * run.offsets / readings
 
     def _uncertainty(
         self, s: _Sums, speed: float, raw_speed: float, bias: FloatArray, duration: float

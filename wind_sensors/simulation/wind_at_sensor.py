@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
+from wind_sensors.instruments.dynamics.wake import wake_factor
 from wind_sensors.motion import relative_wind, rotations
 from wind_sensors.motion.downwash import rotor_downwash
 from wind_sensors.motion.platform_errors import true_motion
@@ -66,11 +67,12 @@ def _scale_by_fourier(
 
 
 @compiled
-def _scale_by_wake(wind: FloatArray, centre: float, depth: float, width: float) -> None:
+def _scale_by_wake(
+    wind: FloatArray, centre: float, depth: float, width: float, flank: float
+) -> None:
     for i in range(wind.shape[0]):
         away = np.arctan2(-wind[i, 1], -wind[i, 0]) - centre
-        away -= 2.0 * np.pi * np.floor((away + np.pi) / (2.0 * np.pi))
-        factor = 1.0 - depth * np.exp(-0.5 * (away / width) ** 2)
+        factor = wake_factor(away, depth, width, flank)
         for k in range(3):
             wind[i, k] *= factor
 
@@ -158,7 +160,7 @@ class WindAtSensors:
         in_sensor = wind @ to_platform
         for wake in instrument.wake_shadows:
             centre, width = np.radians((wake.bearing_from_deg, wake.width_deg))
-            _scale_by_wake(in_sensor, float(centre), wake.depth, float(width))
+            _scale_by_wake(in_sensor, float(centre), wake.depth, float(width), wake.flank)
         distortion = instrument.flow_distortion
         if distortion != FlowDistortion():
             _scale_by_fourier(

@@ -62,6 +62,8 @@ class WakeShadow(Entry):
     """Relative loss of speed in the middle (negative: speed-up)."""
     width_deg: Positive
     """Standard deviation of the Gaussian."""
+    flank: float = Field(default=0.0, ge=-0.5, le=0.5)
+    """Relative speed-up beside the wake, at 2.8 widths on either side of its middle."""
 
 
 class FlowDistortion(Entry):
