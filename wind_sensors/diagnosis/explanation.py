@@ -23,8 +23,8 @@ FloatArray = npt.NDArray[np.float64]
 ACCEPTED_GAIN = 14.0
 """Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
 
-LOUDEST_FACTOR = 1.3
-"""A name needs this many times what the loudest healthy recording promises."""
+LOUDEST_FACTOR = 1.2
+"""A name needs this many times what the loudest of the healthy recordings promises."""
 
 ACCEPTED_FURTHER_GAIN = 22.0
 """The same for a second and a third effect."""

@@ -20,8 +20,8 @@ from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
-MERGE_CANDIDATES = 12
-SWAP_CANDIDATES = 4
+MERGE_CANDIDATES = 8
+SWAP_CANDIDATES = 3
 SWAP_GAIN = 1.0
 
 

@@ -38,6 +38,15 @@ LEAST_GAIN = 6.0
 LEAST_SHARE = 0.03
 """Effects whose linear score stays below this, or below this share of the best, are not fitted."""
 
+REFERENCE_LAG = 0.25
+"""Standard deviation of the common delay, in separations over the wind's speed."""
+
+CANDIDATE_ITERATIONS = 4
+"""Gauss-Newton steps of a candidate's fit; the best few are fitted to the end."""
+
+CLOSE_START = 0.03
+"""A second starting point is tried if its cost lies within this share of the best one's."""
+
 PENALTY_PER_PARAMETER = 3.0
 """Cost of one more parameter, in units of the squared white vector."""
 
@@ -107,12 +116,12 @@ class Searcher:
     def _reference_lag(self, signatures: FloatArray) -> FloatArray:
         """Signature of the delay, common to all channels, between reference and instruments.
 
-        The wind takes up to separation / speed from one to the other; half of that is taken as
-        the standard deviation. Shape (1, m), or (0, m) for a reference at the same place.
+        The wind takes up to separation / speed from one to the other, less when it turns. Shape
+        (1, m), or (0, m) for a reference at the same place.
         """
         reference = self.comparison.recording.station.reference
         distance = 0.0 if reference is None else reference.separation
-        delay = 0.5 * distance / float(np.mean(self.comparison.speed))
+        delay = REFERENCE_LAG * distance / float(np.mean(self.comparison.speed))
         row = np.zeros(signatures.shape[1])
         for template, signature in zip(self.bank.templates, signatures, strict=True):
             if template.effect.name == "timestamp_latency" and template.number == 0:
@@ -191,9 +200,11 @@ class Searcher:
         ranked.sort()
         if not ranked:
             ranked = [(np.inf, 0)]
+        best = ranked[0][0]
+        tried = [k for cost, k in ranked[:2] if cost <= best + CLOSE_START * abs(best)]
         fits = [
-            fit(whitener, self.station, [*fixed, starts[k]], rest)
-            for _, k in ranked[: 2 if len(ranked) > 2 else 1]
+            fit(whitener, self.station, [*fixed, starts[k]], rest, CANDIDATE_ITERATIONS)
+            for k in tried
         ]
         return min(fits, key=lambda f: f.cost)
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.calibrated_range import TOO_CALM, is_too_calm, need_calibration
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
@@ -341,18 +342,26 @@ def diagnose(
     equal = _equal(naming)
     located_p = bank.p_value(max(f.score for f in before))
     verdict = _verdict(naming, equal, remainder, detectable, located_p)
+    calm = is_too_calm(comparison, baseline) and verdict != "none" and (
+        not naming.fit.terms or need_calibration(naming.fit.terms)
+    )
+    if calm:
+        verdict = "inconclusive"
     report("proving")(0.2)
     findings = _findings(naming, equal, before, bank, baseline, with_proof) if verdict in {
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
-    station = planted(baseline.station, named)
+    # What commissioning found makes up for the reference as much as for the instrument.
+    station = planted(baseline.original, named)
     if verdict == "unknown":
         after = _structured(before)
     description = ""
     if verdict == "unknown" or remainder[1] < REMAINDER_P:
         description = _description(after[0])
+    if calm:
+        description = TOO_CALM
     return Diagnosis(
         recording=recording.name,
         verdict=verdict,

@@ -26,7 +26,10 @@ def _is_rotor(entry: Entry, station: Station) -> bool:
 def _shadow(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Instrument)
     shadow = WakeShadow.model_construct(
-        bearing_from_deg=values["bearing_from"], depth=values["depth"], width_deg=values["width"]
+        bearing_from_deg=values["bearing_from"],
+        depth=values["depth"],
+        width_deg=values["width"],
+        flank=values["flank"],
     )
     return {"wake_shadows": (*entry.wake_shadows, shadow)}
 
@@ -35,7 +38,8 @@ WAKE_SHADOW = Effect(
     name="wake_shadow",
     meaning="The wind from one bearing reaches the rotor through the wake of an obstacle.",
     entrance="wind",
-    equation="U' = U (1 - depth exp(-(D - D0)^2 / (2 width^2)))",
+    equation="U' = U (1 - depth exp(-x^2 / 2) + flank exp(-(|x| - 2.8)^2 / 2)), "
+    "x = (D - D0) / width",
     source="Gaussian wake profile; IEC 61400-12-1, annex on mast influence",
     region="a sector of wind directions, all speeds",
     standing=0.06,
@@ -43,11 +47,12 @@ WAKE_SHADOW = Effect(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),
         Parameter("depth", "1", -0.6, 0.95, minimum=0.05),
         Parameter("width", "deg", 3.0, 40.0, healthy=None, step=0.5),
+        Parameter("flank", "1", -0.1, 0.3, step=0.01),
     ),
     applies=_is_rotor,
     update=_shadow,
     templates=tuple(
-        {"bearing_from": float(bearing), "depth": 0.05, "width": width}
+        {"bearing_from": float(bearing), "depth": 0.05, "width": width, "flank": 0.0}
         for width, step in ((8.0, 10), (20.0, 20))
         for bearing in range(0, 360, step)
     ),

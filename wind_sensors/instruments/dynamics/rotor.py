@@ -191,6 +191,12 @@ def rotor_acceleration(
 
 
 @compiled
+def _not_beyond_rest(reached: float, y: float, friction: float) -> float:
+    """A stage of a step that friction ends at rest: there its torque would turn round."""
+    return 0.0 if friction > 0.0 and y != 0.0 and reached * y < 0.0 else reached
+
+
+@compiled
 def advance_rotor(
     p: RotorParameters,
     y: float,
@@ -275,13 +281,13 @@ def advance_forced(
             p, y, psi, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0),
             e_0 + f_0 * (e_1 - e_0), l_0, density_ratio, temperature,
         )  # fmt: skip
-        y_2 = y + 0.5 * step * k_1
+        y_2 = _not_beyond_rest(y + 0.5 * step * k_1, y, p.friction)
         psi_2 = psi + 0.5 * step * y * inverse_length
         k_2 = rotor_acceleration(p, y_2, psi_2, a_h, b_h, e_h, l_h, density_ratio, temperature)
-        y_3 = y + 0.5 * step * k_2
+        y_3 = _not_beyond_rest(y + 0.5 * step * k_2, y, p.friction)
         psi_3 = psi + 0.5 * step * y_2 * inverse_length
         k_3 = rotor_acceleration(p, y_3, psi_3, a_h, b_h, e_h, l_h, density_ratio, temperature)
-        y_4 = y + step * k_3
+        y_4 = _not_beyond_rest(y + step * k_3, y, p.friction)
         psi_4 = psi + step * y_3 * inverse_length
         k_4 = rotor_acceleration(
             p, y_4, psi_4, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
