@@ -90,7 +90,7 @@ BEARING_FRICTION = Effect(
     region="low speeds; the rotor stalls below U_s",
     parameters=(
         Parameter(
-            "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 2.0)
+            "friction_speed", "m/s", 0.0, 6.0, minimum=0.3, step=0.1, starts=(0.5, 1.0, 2.0)
         ),
         Parameter(
             "temperature_coefficient", "1/K", -1.0, 0.05, step=0.01, swing=3.0,
