@@ -49,14 +49,22 @@ def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> np.
     return size * np.sqrt(1.0 - decay**2) * lfilter([1.0], [1.0, -decay], drawn)[4000:]
 
 
-def recorded(station: Station, seed: int, mean: float = 7.0) -> Recording:
-    """A recording of a station in a wind that its reference sees with errors."""
+def recorded(station: Station, seed: int, mean: float = 7.0, swing: float = 0.0) -> Recording:
+    """A recording of a station in a wind that its reference sees with errors.
+
+    Args:
+        station: Made the signals.
+        seed: Of the wind.
+        mean: Speed [m/s].
+        swing: Amplitude of a turning to and fro every 45 s [rad].
+    """
     rng = np.random.default_rng(seed)
     n = int(SECONDS / DT)
     speed = mean + _noise(rng, n, 60.0, 1.3) + _noise(rng, n, 3.0, 0.8)
     speed = np.maximum(speed, 0.5)
     turn = np.radians(20.0 * rng.standard_normal()) + _noise(rng, n, 80.0, 0.5)
     turn = turn + _noise(rng, n, 2.0, 0.1)
+    turn = turn + swing * np.sin(2.0 * np.pi * DT * np.arange(n) / 45.0)
     wind = np.stack(
         (speed * np.cos(turn), speed * np.sin(turn), _noise(rng, n, 1.0, 0.35)), axis=1
     )

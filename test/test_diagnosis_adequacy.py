@@ -1,0 +1,78 @@
+"""What may be left after a name, and what a name needs, on simulated recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.comparison import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.diagnosis.whitening import form_signatures, trust_of
+from wind_sensors.errors import UserError
+from wind_sensors.simulation.response import ResponseState, respond
+from wind_sensors.station.signals import Angles, Recording
+
+
+def _with_readings(recording: Recording, shift: np.ndarray) -> Recording:
+    """The recording with the vane's readings moved by so much [rad]."""
+    angles = recording.angles["vane"]
+    wrapped = np.angle(np.exp(1j * (angles.angle + shift)))
+    return replace(recording, angles={"vane": Angles(angles.time, wrapped)})
+
+
+def test_an_effect_of_another_form_keeps_its_name() -> None:
+    # A fin that bends: the offset grows by a tenth from calm to gust.
+    recording = recorded(STATION, 60)
+    assert recording.reference is not None
+    speed = np.hypot(*recording.reference.velocity[:, :2].T)
+    rank = np.argsort(np.argsort(speed)) / speed.size
+    found = diagnose(_with_readings(recording, np.radians(8.0) * (0.95 + 0.1 * rank)), baseline())
+    assert [f.term.effect.name for f in found.findings] == ["vane_offset"]
+
+
+def test_what_no_effect_describes_is_unknown() -> None:
+    # A reading that creeps away and back within the record: not an offset, not a disc off centre.
+    recording = recorded(STATION, 61)
+    at = recording.angles["vane"].time * 1e-9
+    creep = np.radians(12.0) * np.sin(2.0 * np.pi * at / 130.0)
+    assert diagnose(_with_readings(recording, creep), baseline()).verdict == "unknown"
+
+
+def test_a_louder_healthy_day_asks_for_more_than_a_small_effect_gives() -> None:
+    station = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 0.94})
+    recording = recorded(station, 62)
+    assert diagnose(recording, baseline()).verdict in {"named", "ambiguous"}
+    loud = replace(baseline(), loudest_gain=1e4)
+    assert diagnose(recording, loud).naming.fit.terms == ()
+
+
+def test_a_vane_that_swings_past_the_opposite_direction_does_not_jump() -> None:
+    # The slow direction cannot follow such a wind: the vane passes its opposite again and again,
+    # measured and simulated not in the same instant. A turn too many is a residual of 2 pi.
+    comparison = prepare(recorded(STATION, 63, swing=3.1))
+    simulated = comparison.simulate(STATION)
+    name = "vane/vane_angle"
+    away = (comparison.measured.series[name] - simulated.series[name]) / comparison.speed
+    assert np.abs(comparison.measured.series[name] / comparison.speed).max() > np.pi
+    assert np.abs(away).max() < np.pi
+
+
+def test_the_form_of_no_change_is_no_signature() -> None:
+    comparison = prepare(recorded(STATION, 64))
+    simulated = comparison.simulate(STATION)
+    trust = trust_of(comparison, simulated, baseline())
+    assert form_signatures(comparison, trust, simulated, simulated).shape[0] == 0
+
+
+def test_a_rotor_that_runs_away_is_refused_at_once() -> None:
+    # With a4 above one the quadratic torque pushes a rotor that already turns too fast.
+    comparison = prepare(recorded(STATION, 65))
+    cup = STATION.instrument("cup").model_copy(update={"a4": 2.4, "inertia_factor": 0.2})
+    station = STATION.model_copy(update={"instruments": (cup, STATION.instrument("vane"))})
+    with pytest.raises(UserError, match="runs away"):
+        respond(station, comparison.drive, ResponseState(rotors={"cup": (600.0, 0.0)}))
