@@ -8,14 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import Parameter
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
 from wind_sensors.diagnosis.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_INTERVAL,
     PENALTY_PER_PARAMETER,
     Searcher,
 )
+from wind_sensors.diagnosis.signatures import in_parallel
 from wind_sensors.diagnosis.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,7 +28,7 @@ ACCEPTED_GAIN = 14.0
 LOUDEST_FACTOR = 1.2
 """A name needs this many times what the loudest of the healthy recordings promises."""
 
-ACCEPTED_FURTHER_GAIN = 22.0
+ACCEPTED_FURTHER_GAIN = 32.0
 """The same for a second and a third effect."""
 
 FURTHER_SHARE = 0.05
@@ -60,7 +62,8 @@ def needed_gain(current: Fit, nothing: float, loudest: float) -> float:
     """
     if not current.terms:
         return max(ACCEPTED_GAIN, LOUDEST_FACTOR * loudest)
-    return max(ACCEPTED_FURTHER_GAIN, FURTHER_SHARE * (nothing - current.cost))
+    share = FURTHER_SHARE * (nothing - current.cost)
+    return max(ACCEPTED_FURTHER_GAIN, LOUDEST_FACTOR * loudest, share)
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,66 @@ def seen_in(whitener: Whitener, current: Fit) -> Fit:
 
 def total(candidate: Fit) -> float:
     return candidate.cost + parameter_cost(candidate.terms, candidate.active)
+
+
+def evidence(candidate: Fit, whitener: Whitener) -> float:
+    """Minus twice the log-likelihood with the noise as the candidate itself leaves it, penalised.
+
+    Unlike the cost in one null it compares explanations that are each judged in their own: what
+    explains more leaves less noise, and pays less for the sum of its logarithms.
+
+    Args:
+        candidate: A fit.
+        whitener: The null in which it was made.
+    """
+    penalty = parameter_cost(candidate.terms, candidate.active)
+    return whitener.deviance(candidate.simulated) + penalty
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fit in the null that it leaves itself.
+
+    Attributes:
+        fit: The fit.
+        whitener: Its null.
+        evidence: Minus twice the penalised log-likelihood.
+    """
+
+    fit: Fit
+    whitener: Whitener
+    evidence: float
+
+
+def judged(
+    searcher: Searcher,
+    explanations: Sequence[Fit],
+    named: Simulated | None = None,
+    iterations: int = 3,
+) -> list[Judged]:
+    """Fits made again, each in its own null; best first.
+
+    Args:
+        searcher: The search.
+        explanations: Fits in whatever null.
+        named: Simulation of effects whose form need not be exact.
+        iterations: Largest number of Gauss-Newton steps.
+    """
+
+    def one(candidate: Fit) -> tuple[Fit, float]:
+        whitener = searcher.whitener(candidate.simulated, named)
+        again = fit(
+            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations
+        )
+        whitener = searcher.whitener(again.simulated, named)
+        again = seen_in(whitener, again)
+        return again, evidence(again, whitener)
+
+    fits = in_parallel(one, list(explanations), searcher.workers)
+    return [
+        Judged(again, searcher.whitener(again.simulated, named), value)
+        for again, value in sorted(fits, key=lambda pair: pair[1])
+    ]
 
 
 def value_at(term: Term, parameter: Parameter) -> float:

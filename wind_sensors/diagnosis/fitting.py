@@ -198,7 +198,8 @@ def fit(
     air = whitener.comparison.drive.temperature
     swing = 0.0 if air is None else float(np.ptp(air))
     for k, parameter in enumerate(parameters):
-        if parameter.swing > swing and parameter.healthy is not None:
+        tied = parameter.free is not None and not parameter.free(whitener.comparison.drive)
+        if (tied or parameter.swing > swing) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
     values = np.clip(values_of(terms), low, high)
     cost, vector, first = problem.trial(values)

@@ -7,6 +7,8 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparison import BANDS, Comparison
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import PLATFORM
+from wind_sensors.diagnosis.effects.platform import log_is_dead
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.station.model import Angle, Rotor, Station
 
@@ -29,6 +31,9 @@ def _term(effect: str, instrument: str, **values: float) -> Term:
 def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     """Effects that the raw signals suggest, with starting values, by effect and instrument."""
     out: Guesses = {}
+    if log_is_dead(comparison.drive):
+        still = _term("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
+        out[still.key] = [still]
     simulated = comparison.simulate(station)
     for channel in comparison.channels:
         entry = station.instrument(channel.instrument)

@@ -12,6 +12,9 @@ from wind_sensors.diagnosis.explanation import (
     FURTHER_SHARE,
     SMALLEST_SIZE,
     Alternative,
+    Judged,
+    evidence,
+    judged,
     no_terms,
     plausible,
     total,
@@ -21,6 +24,7 @@ from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
 MERGE_CANDIDATES = 8
+MERGE_FINALISTS = 3
 SWAP_CANDIDATES = 3
 SWAP_GAIN = 1.0
 
@@ -69,23 +73,27 @@ def merged(
         if starts[0].key not in known
     ]
     intervals = {ALWAYS, *(t.interval for t in current.terms)}
-    candidates = [
-        [replace(terms[0], interval=interval)]
-        for terms in (*singles, *more)
+    candidates: dict[tuple[tuple[str, str], object], list[Term]] = {
+        (terms[0].key, interval): [replace(terms[0], interval=interval)]
+        for terms in (*more, *reversed(singles))
         if terms[0].instrument in crowded
         for interval in intervals
-    ]
-    fits = searcher.refit_all(whitener, candidates)
-    best = min((f for f in fits if plausible(f)), key=total, default=current)
+    }
+    fits = searcher.refit_all(whitener, list(candidates.values()))
+    promising = sorted((f for f in fits if plausible(f)), key=total)[:MERGE_FINALISTS]
+    ranked = [r for r in judged(searcher, promising) if plausible(r.fit)]
     margin = ACCEPTED_FURTHER_GAIN + FURTHER_SHARE * (nothing.cost - current.cost)
-    return best if total(best) < total(current) + margin else current
+    if ranked and ranked[0].evidence < evidence(current, whitener) + margin:
+        return ranked[0].fit
+    return current
 
 
 def swapped(
     searcher: Searcher, whitener: Whitener, current: Fit
 ) -> tuple[Fit, tuple[Alternative, ...]]:
     """The explanation with single terms exchanged for better ones, and those that come close."""
-    losers: list[Fit] = []
+    losers: list[Judged] = []
+    leader = Judged(current, whitener, evidence(current, whitener))
     for k in range(len(current.terms)):
         others = [t for j, t in enumerate(current.terms) if j != k]
         without = fit(whitener, searcher.station, others, searcher.bank.without, iterations=3)
@@ -95,11 +103,16 @@ def swapped(
             for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
             if starts[0].key not in used
         ]
-        rivals = searcher.fit_all(whitener, without.terms, candidates)
-        losers.extend(f for f in rivals if plausible(f))
-        best = min((f for f in rivals if plausible(f)), key=total, default=current)
-        if total(best) < total(current) - SWAP_GAIN:
-            losers.append(current)
-            current = best
-    behind = [Alternative(f, total(f) - total(current)) for f in losers if f is not current]
+        rivals = [
+            f for f in searcher.fit_all(whitener, without.terms, candidates) if plausible(f)
+        ]
+        ranked = [r for r in judged(searcher, rivals) if plausible(r.fit)]
+        losers.extend(ranked)
+        if ranked and ranked[0].evidence < leader.evidence - SWAP_GAIN:
+            losers.append(leader)
+            leader = ranked[0]
+            current = leader.fit
+    behind = [
+        Alternative(r.fit, r.evidence - leader.evidence) for r in losers if r is not leader
+    ]
     return current, tuple(sorted(behind, key=lambda a: a.behind))

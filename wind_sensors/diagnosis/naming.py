@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from wind_sensors.diagnosis.explanation import (
     Alternative,
+    Judged,
     Naming,
+    judged,
     needed_gain,
     no_terms,
     plausible,
@@ -22,17 +24,27 @@ from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_
 from wind_sensors.diagnosis.screening import screen
 from wind_sensors.diagnosis.search import Searcher
 
-MOST_EFFECTS = 3
+MOST_EFFECTS = 2
 
 NARROW_SHARE = 0.85
 """Effects of single instruments win over broad ones from this share of their gain on, if they
 need fewer parameters."""
 
+BROAD_PARAMETERS = 3
+"""From so many fitted parameters on, an explanation with a broad effect is challenged."""
+
+CLEARLY_BETTER = 12.0
+"""Drop of the penalised cost at which two narrow effects take the place of a broad one."""
+
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
-FINALISTS = 5
-FAR_BEHIND = 0.6
+FINALISTS = 7
+CONTENDERS = 4
+FAR_BEHIND = 0.8
 """Fits that miss more than this share of the leader's gain do not compete with it."""
+
+WORTH_JUDGING = 0.5
+"""Share of the needed gain that a fit must bring before the noise is judged again."""
 
 STALL_SPEED = 4.5
 """Up to this wind speed [m/s] a sticking bearing may hold a rotor."""
@@ -55,16 +67,38 @@ def name(
     """
     found = _greedy(searcher, progress, frozenset())
     broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
-    if not broad or len(found.fit.terms) < 2:
+    if not broad or found.fit.active < BROAD_PARAMETERS:
         return found
     narrow = _greedy(
         searcher, progress, frozenset(n for n, e in searcher.effects.items() if e.everywhere)
     )
+    if narrow.fit.terms and _fits_better(searcher, narrow, found):
+        return narrow
     simpler = (
         0 < narrow.fit.active < found.fit.active
         and len(narrow.fit.terms) <= len(found.fit.terms)
     )
     return narrow if simpler and narrow.gain > NARROW_SHARE * found.gain else found
+
+
+def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
+    """Whether an explanation fits clearly better than another."""
+    first, second = judged(searcher, [one.fit, other.fit])
+    wins = [t.key for t in first.fit.terms] == [t.key for t in one.fit.terms]
+    return wins and first.evidence < second.evidence - CLEARLY_BETTER
+
+
+def _brings(searcher: Searcher, candidate: Judged, fixed: Sequence[Term]) -> float:
+    """Drop of the penalised cost over the terms before, in the candidate's own null."""
+    if not plausible(candidate.fit):
+        return -np.inf
+    whitener = candidate.whitener
+    before = (
+        fit(whitener, searcher.station, fixed, searcher.bank.without)
+        if fixed
+        else no_terms(whitener, searcher)
+    )
+    return total(before) - total(candidate.fit)
 
 
 def _greedy(
@@ -118,41 +152,30 @@ def _greedy(
         )
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
-        if not fits or total(current) - total(fits[0]) < needed:
+        if not fits or total(current) - total(fits[0]) < WORTH_JUDGING * needed:
             break
-        # Noise and coherence were judged with the mismatch still in them: judge again, and let
-        # the best few compete in that null.
-        refitted: list[Fit] = []
-        for _ in range(2):
-            leader = (refitted or fits)[0]
-            whitener = searcher.whitener(leader.simulated, named)
-            best = total(leader)
-            reach = FAR_BEHIND * (total(current) - best)
-            pool = [f for f in (refitted or fits)[:FINALISTS] if total(f) - best <= reach]
-            null = whitener
-            refitted = searcher.refit_all(null, [f.terms for f in pool])
-            refitted = [
-                refined_interval(searcher, null, f.terms[:-1], f)
-                if k < 2 and f.terms[-1].interval != ALWAYS
-                else f
-                for k, f in enumerate(sorted(refitted, key=total))
-            ]
-            refitted = sorted(
-                (f for f in refitted if f is leader or plausible(f)), key=total
-            ) or [leader]
-            if refitted[0].terms[-1].key == leader.terms[-1].key:
-                break
-        before = fit(whitener, searcher.station, fixed, searcher.bank.without) if fixed else (
-            no_terms(whitener, searcher)
-        )
-        if total(before) - total(refitted[0]) < needed or not plausible(refitted[0]):
-            current = before
+        # Noise and coherence were judged with the mismatch still in them: the best few compete,
+        # each in the null that it leaves itself.
+        best = total(fits[0])
+        reach = FAR_BEHIND * (total(current) - best)
+        pool = [f for f in fits[:FINALISTS] if total(f) - best <= reach]
+        ranked = judged(searcher, pool, named)
+        ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
+        ranked = [r for r in ranked if plausible(r.fit)]
+        if ranked and ranked[0].fit.terms[-1].interval != ALWAYS:
+            passing = ranked[0]
+            sharper = refined_interval(
+                searcher, passing.whitener, passing.fit.terms[:-1], passing.fit
+            )
+            ranked[:1] = judged(searcher, [sharper], named)
+        leader = next((r for r in ranked if _brings(searcher, r, fixed) >= needed), None)
+        if leader is None:
             break
-        current = refitted[0]
+        current = leader.fit
         if first:
             alone = current.terms
         losers = tuple(
-            Alternative(f, total(f) - total(current)) for f in refitted[1:]
+            Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not leader
         )
         alternatives = (*alternatives, *losers) if not first else losers
     whitener = searcher.whitener(current.simulated)
@@ -161,7 +184,7 @@ def _greedy(
     else:
         current = seen_in(whitener, current)
     if len(current.terms) > 1:
-        singles = [alone, *(a.fit.terms for a in alternatives if len(a.fit.terms) == 1)]
+        singles = [alone, *((term,) for a in alternatives for term in a.fit.terms)]
         current = merged(searcher, whitener, pruned(searcher, whitener, current), singles)
         if len(current.terms) > 1:
             current, alternatives = swapped(searcher, whitener, current)

@@ -77,7 +77,9 @@ def window_starts(
             window[0] + since if window[0] > 0.0 else 0.0,
             None if window[1] >= length else window[1] + since,
         )
-        found.append((gain, [Term(template.effect, score.instrument, values, interval)]))
+        starts = [Term(template.effect, score.instrument, values, interval)]
+        starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
+        found.append((gain, starts))
     ranked = sorted(found, key=lambda pair: -pair[0])
     return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
 

@@ -44,8 +44,10 @@ REFERENCE_LAG = 0.25
 CANDIDATE_ITERATIONS = 4
 """Gauss-Newton steps of a candidate's fit; the best few are fitted to the end."""
 
-CLOSE_START = 0.03
-"""A second starting point is tried if its cost lies within this share of the best one's."""
+TRIED_STARTS = 3
+CLOSE_START = 0.1
+"""A second starting point is tried if its deviance lies within this share of the number of data
+of the best one's."""
 
 PENALTY_PER_PARAMETER = 3.0
 """Cost of one more parameter, in units of the squared white vector."""
@@ -178,7 +180,12 @@ class Searcher:
         self, whitener: Whitener, fixed: Sequence[Term], starts: Sequence[Term],
         rest: Simulated | None,
     ) -> Fit:
-        """Fit of known terms and one more, from the best of several starting points."""
+        """Fit of known terms and one more, from the best of several starting points.
+
+        What an effect that smooths leaves unexplained depends on its size, so that each size is
+        judged in the noise that it leaves itself.
+        """
+        smooths = bool(starts) and starts[0].effect.smooths
         comparison = self.comparison
         ranked: list[tuple[float, int]] = []
         for k, start in enumerate(starts):
@@ -193,19 +200,23 @@ class Searcher:
                     }
                 )
             try:
-                vector = whitener.of(comparison.simulate(station, only, rest))
+                simulated = comparison.simulate(station, only, rest)
             except (UserError, ValueError):
                 continue
-            ranked.append((float(vector @ vector), k))
+            null = self.whitener(simulated) if smooths else whitener
+            ranked.append((null.deviance(simulated), k))
         ranked.sort()
         if not ranked:
             ranked = [(np.inf, 0)]
         best = ranked[0][0]
-        tried = [k for cost, k in ranked[:2] if cost <= best + CLOSE_START * abs(best)]
+        close = CLOSE_START * float(whitener.of(self.bank.without).size)
+        tried = [k for deviance, k in ranked[:TRIED_STARTS] if smooths or deviance <= best + close]
         fits = [
             fit(whitener, self.station, [*fixed, starts[k]], rest, CANDIDATE_ITERATIONS)
             for k in tried
         ]
+        if smooths:
+            return min(fits, key=lambda f: self.whitener(f.simulated).deviance(f.simulated))
         return min(fits, key=lambda f: f.cost)
 
     def fit_all(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -91,7 +91,9 @@ def templates_of(
         if name not in compared:
             continue
         for effect in effects.values():
-            if effect.everywhere != (name == STATION):
+            if name == STATION and not (effect.everywhere or effect.shared):
+                continue
+            if effect.everywhere and name != STATION:
                 continue
             if not any(
                 effect.applies(entry_of(station, one), station)
@@ -162,11 +164,35 @@ class SignatureBank:
     templates: list[Template]
     without: Simulated
     with_each: list[Simulated]
+    _changes: dict[tuple[str, ...], FloatArray] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def whitened(self, comparison: Comparison, trust: Mapping[str, Trust]) -> FloatArray:
         """Noise-whitened signatures, one a row."""
-        nothing = comparison.vector(self.without, trust)
-        return np.array([nothing - comparison.vector(s, trust) for s in self.with_each])
+        weights = []
+        for channel in comparison.channels:
+            t = trust[channel.name]
+            weights.append(t.slope / t.deviation)
+        for channel in comparison.channels:
+            measured = comparison.measured.statistics[channel.name]
+            deviation = trust[channel.name].statistics_deviation
+            weights.append(np.where(np.isfinite(measured), 1.0 / deviation, 0.0))
+        return self._changed(tuple(c.name for c in comparison.channels)) * np.concatenate(weights)
+
+    def _changed(self, channels: tuple[str, ...]) -> FloatArray:
+        """What each template changes in all coefficients and statistics, one a row."""
+        if channels not in self._changes:
+            rows = []
+            for each in self.with_each:
+                parts = [each.cosine[c] - self.without.cosine[c] for c in channels]
+                parts += [
+                    np.nan_to_num(each.statistics[c] - self.without.statistics[c])
+                    for c in channels
+                ]
+                rows.append(np.concatenate(parts))
+            self._changes[channels] = np.array(rows)
+        return self._changes[channels]
 
 
 def signature_bank(

@@ -33,7 +33,7 @@ Verdict = Literal["none", "named", "ambiguous", "unknown", "inconclusive"]
 EQUAL_LIKELIHOOD = 3.0
 """Explanations whose log-likelihoods lie closer are reported together."""
 
-EQUAL_SHARE = 0.04
+EQUAL_SHARE = 0.02
 """So are those that miss the winner by less than this share of its gain: the simulation is not
 exact enough to tell them apart."""
 
@@ -48,7 +48,7 @@ REMAINDER_SCORES = {
     "direction": 28.0,
     "heading": 28.0,
     "speed": 16.0,
-    "all": 12.0,
+    "all": 20.0,
 }
 """Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
 raise the power of a band on healthy days, too; a named effect leaves less than this where its form
@@ -205,9 +205,23 @@ def _alike(naming: Naming, alternative: Alternative) -> bool:
     return cosine > LEAST_LIKENESS
 
 
-def _remainder(naming: Naming, bank: RegionBank) -> tuple[float, float, float]:
-    """Largest remaining score relative to its limit, its p value, its share of the misfit."""
+def _remainder(
+    naming: Naming, bank: RegionBank, comparison: Comparison
+) -> tuple[float, float, float]:
+    """Largest remaining score relative to its limit, its p value, its share of the misfit.
+
+    Of the channels that the named effects reach: what another instrument shows beside them says
+    nothing against the names.
+    """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
+    if naming.fit.terms:
+        reached = {
+            instrument
+            for term in naming.fit.terms
+            for instrument in comparison.affected(comparison.recording.station, term.instrument)
+        }
+        channels = {c.name for c in comparison.channels if c.instrument in reached}
+        scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
     limits = np.array([REMAINDER_SCORES[r.kind] for r in bank.regions])
     worst = int(np.argmax(scores / limits))
     left = float(scores[worst])
@@ -337,7 +351,7 @@ def diagnose(
     rest = region_bank(naming.adequate, searcher.bank.without)
     left = naming.adequate.of(naming.fit.simulated)
     after = strongest(naming.adequate, rest, left, naming.fit.simulated)
-    remainder = _remainder(naming, rest)
+    remainder = _remainder(naming, rest, comparison)
     detectable = smallest_detectable(searcher, whitener)
     equal = _equal(naming)
     located_p = bank.p_value(max(f.score for f in before))

@@ -98,6 +98,12 @@ class Whitener:
         """White vector of a simulation."""
         return self.through_standing(self.noise_whitened(simulated))
 
+    def deviance(self, simulated: Simulated) -> float:
+        """Minus twice the log-likelihood of a simulation, but for a constant."""
+        vector = self.of(simulated)
+        noise = sum(float(np.sum(np.log(t.deviation))) for t in self.trust.values())
+        return float(vector @ vector) + 2.0 * (noise - float(np.sum(np.log(self.shrinks))))
+
     def of_station(self, station: Station) -> FloatArray:
         """White vector of a station."""
         return self.of(self.comparison.simulate(station))

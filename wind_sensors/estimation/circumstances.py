@@ -118,6 +118,7 @@ class CircumstanceSource:
                 attitude_deviation=float(np.radians(platform.attitude_noise_deg)),
                 velocity_deviation=platform.velocity_noise,
             ),
+            with_travel=platform.position_share != 0.0,
         )
         sample = track.at(times)
         motion = true_motion(replace_clock(platform), sample.motion, 1.0)

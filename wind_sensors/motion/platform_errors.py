@@ -88,6 +88,7 @@ def true_motion(platform: Platform, reported: Motion, dt: float, elapsed: float 
             ),
             angular_rate=frames.swap_flu_frd(motion.angular_rate),
             position=frames.swap_enu_ned(motion.position),
+            travel=None if motion.travel is None else frames.swap_enu_ned(motion.travel),
         )
     declination = _declination(platform)
     if declination != 0.0 or platform.heading_deviation != HeadingDeviation():
@@ -104,6 +105,10 @@ def true_motion(platform: Platform, reported: Motion, dt: float, elapsed: float 
         )
     if platform.velocity_scale != 1.0:
         motion = replace(motion, velocity=motion.velocity / platform.velocity_scale)
+    if platform.position_share != 0.0 and motion.travel is not None:
+        travel = rotations.rotate_back(motion.attitude, motion.travel)
+        share = platform.position_share
+        motion = replace(motion, velocity=(1.0 - share) * motion.velocity + share * travel)
     return motion
 
 

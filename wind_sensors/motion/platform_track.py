@@ -16,6 +16,10 @@ FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 
+TRAVEL_SPAN = 1.0
+"""Time [s] over which positions are compared for a velocity."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """Attitude and motion of the carrier at n instants.
@@ -25,12 +29,15 @@ class Motion:
         velocity: Of the platform's origin, in platform axes [m/s], shape (n, 3).
         angular_rate: In platform axes [rad/s], shape (n, 3).
         position: ENU [m], shape (n, 3).
+        travel: Velocity that the positions' change gives, ENU [m/s], shape (n, 3); None: not asked
+            for.
     """
 
     attitude: FloatArray
     velocity: FloatArray
     angular_rate: FloatArray
     position: FloatArray
+    travel: FloatArray | None = None
 
     @cached_property
     def to_earth(self) -> FloatArray:
@@ -44,8 +51,9 @@ class Motion:
         """The instants `start` to `stop` - 1."""
         here = slice(start, stop)
         return Motion(
-            self.attitude[here], self.velocity[here], self.angular_rate[here], self.position[here]
-        )
+            self.attitude[here], self.velocity[here], self.angular_rate[here], self.position[here],
+            None if self.travel is None else self.travel[here],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -96,13 +104,20 @@ class PlatformTrack:
     Args:
         states: States in any order; doubles in time are dropped.
         limits: How far they may be stretched.
+        with_travel: Give the velocity that follows from the positions, too.
 
     Raises:
         UserError: There is no usable state.
     """
 
-    def __init__(self, states: PlatformStates, limits: TrackLimits | None = None) -> None:
+    def __init__(
+        self,
+        states: PlatformStates,
+        limits: TrackLimits | None = None,
+        with_travel: bool = False,
+    ) -> None:
         self.limits = limits if limits is not None else TrackLimits()
+        self._with_travel = with_travel
         finite = (
             np.isfinite(states.attitude).all(axis=1)
             & np.isfinite(states.velocity).all(axis=1)
@@ -149,6 +164,8 @@ class PlatformTrack:
             angular_rate=(1.0 - weight) * self._rate[left] + weight * self._rate[right],
             position=(1.0 - weight) * self._position[left] + weight * self._position[right],
         )
+        if self._with_travel:
+            motion = replace(motion, travel=self._travel(wanted))
         beyond = np.where(
             wanted < self._time[0],
             (wanted - self._time[0]) * 1e-9,
@@ -158,6 +175,24 @@ class PlatformTrack:
         motion = _carried_on(motion, np.clip(beyond, -longest, longest))
         bulge: FloatArray = inside * (1.0 - inside) * span * span
         return self._judged(motion, beyond, bulge, span)
+
+    def _travel(self, wanted: TimeArray) -> FloatArray:
+        """Change of the position over a second around each instant [m/s], shape (n, 3)."""
+        half = int(0.5e9 * TRAVEL_SPAN)
+        early = np.clip(wanted - half, self._time[0], self._time[-1])
+        late = np.clip(wanted + half, self._time[0], self._time[-1])
+        span = np.maximum((late - early) * 1e-9, 1e-3)
+        since = self._time[0]
+        moved: FloatArray = np.stack(
+            [
+                np.interp(late - since, self._time - since, axis)
+                - np.interp(early - since, self._time - since, axis)
+                for axis in self._position.T
+            ],
+            axis=1,
+        )
+        velocity: FloatArray = moved / span[:, np.newaxis]
+        return velocity
 
     def _judged(
         self, motion: Motion, beyond: FloatArray, bulge: FloatArray, span: FloatArray
@@ -216,6 +251,7 @@ def sampled(motion: Motion, dt: float, seconds: FloatArray) -> Motion:
         velocity=between(motion.velocity),
         angular_rate=between(motion.angular_rate),
         position=between(motion.position),
+        travel=None if motion.travel is None else between(motion.travel),
     )
 
 

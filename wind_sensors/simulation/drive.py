@@ -127,7 +127,7 @@ def drive_from_recording(
                 recording.name,
                 "Record its odometry, or remove `platform` from the station.",
             )
-        motion = PlatformTrack(recording.platform).at(times).motion
+        motion = PlatformTrack(recording.platform, with_travel=True).at(times).motion
     temperature = _on_grid(recording.temperature, times)
     pressure = _on_grid(recording.pressure, times)
     density = None

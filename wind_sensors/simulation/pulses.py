@@ -69,23 +69,46 @@ def _edges_of(
     times = np.empty(room)
     numbers = np.empty(room, dtype=np.int64)
     count = 0
+    known = False
+    ahead = 0
+    ahead_level = 0.0
     for i in range(psi.shape[0] - 1):
         a, b = psi[i], psi[i + 1]
         if a == b:
             continue
-        step = 1 if b > a else -1
-        number = math.floor(a / width) - step * 2
+        if b > a:
+            # Rotors seldom turn back: the next slot ahead is remembered.
+            if not known:
+                ahead = math.floor(a / width) - 2
+                while True:
+                    turn = ahead // slots
+                    ahead_level = 2.0 * math.pi * turn + slot_angles[ahead - turn * slots]
+                    if ahead_level > a:
+                        break
+                    ahead += 1
+                known = True
+            while ahead_level <= b:
+                u = _crossing(a, b, rate[i] * dt, rate[i + 1] * dt, ahead_level)
+                times[count] = (i + u) * dt
+                numbers[count] = ahead
+                count += 1
+                ahead += 1
+                turn = ahead // slots
+                ahead_level = 2.0 * math.pi * turn + slot_angles[ahead - turn * slots]
+            continue
+        known = False
+        number = math.floor(a / width) + 2
         while True:
             turn = number // slots
             level = 2.0 * math.pi * turn + slot_angles[number - turn * slots]
-            if (step > 0 and level > b) or (step < 0 and level < b):
+            if level < b:
                 break
-            if (step > 0 and level > a) or (step < 0 and level < a):
+            if level < a:
                 u = _crossing(a, b, rate[i] * dt, rate[i + 1] * dt, level)
                 times[count] = (i + u) * dt
                 numbers[count] = number
                 count += 1
-            number += step
+            number -= 1
     return times[:count], numbers[:count]
 
 

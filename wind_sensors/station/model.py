@@ -378,6 +378,9 @@ class Platform(Entry):
     """Turn of the reported velocity against those axes, counter-clockwise about up."""
     velocity_share: float = 1.0
     """Share of the platform's velocity that reaches the sensor's signals (0: already removed)."""
+    position_share: float = 0.0
+    """Share of the velocity that is taken from the change of the reported positions (1: all of it,
+    for a log that reports nothing)."""
     heading_deviation: HeadingDeviation = HeadingDeviation()
     """Error of the compass."""
     downwash: Downwash = Downwash()

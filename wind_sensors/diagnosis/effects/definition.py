@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Change, Instrument, Platform, Station
 
 PLATFORM = "platform"
@@ -32,6 +33,7 @@ class Parameter:
         starts: Values from which the search begins (besides the screening's estimate).
         step: Size of a finite difference; 0: a tenth of `minimum`, or of the bounds' distance.
         wraps: Period of an angle, 0 for none.
+        free: Whether what drives the recording lets it be fitted; None: always.
         swing: Smallest change of the air's temperature within the record [K] that the parameter
             needs; with less it keeps its healthy value.
     """
@@ -46,6 +48,7 @@ class Parameter:
     step: float = 0.0
     wraps: float = 0.0
     swing: float = 0.0
+    free: Callable[[Drive], bool] | None = None
 
     @property
     def difference(self) -> float:
@@ -74,6 +77,7 @@ class Effect:
             screening uses one signature per template.
         confusable: Effects it can be mistaken for, with the measurement that separates them.
         everywhere: It concerns all the instruments it applies to at once (the mount, the air).
+        shared: It may concern one instrument or all of them (the logger's clock).
         standing: Share of the smallest size worth reporting at which it is taken to be present on
             any healthy day, whatever healthy recordings say; 0 for what is there or is not.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
@@ -95,6 +99,7 @@ class Effect:
     templates: tuple[dict[str, float], ...]
     confusable: Mapping[str, str] = field(default_factory=dict)
     everywhere: bool = False
+    shared: bool = False
     smooths: bool = False
     standing: float = 0.1
     needs: tuple[str, ...] = ()
@@ -152,7 +157,7 @@ def with_keys(station: Station, instrument: str, keys: Mapping[str, Any]) -> Sta
 
 def touched(station: Station, effect: Effect, instrument: str) -> tuple[str, ...]:
     """Names of the entries that an effect of an instrument changes."""
-    if not effect.everywhere:
+    if not effect.everywhere and instrument != STATION:
         return (instrument,)
     return tuple(e.name for e in station.instruments if effect.applies(e, station))
 

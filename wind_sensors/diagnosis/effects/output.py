@@ -201,7 +201,7 @@ def _drift(entry: Entry, values: Values) -> dict[str, Any]:
 
 CLOCK_DRIFT = Effect(
     name="clock_drift",
-    meaning="The instrument's clock runs fast or slow.",
+    meaning="The clock that stamps the signals runs fast or slow.",
     entrance="clock",
     equation="stamp = time of measurement * (1 + drift)",
     source="definition",
@@ -215,6 +215,7 @@ CLOCK_DRIFT = Effect(
     ),
     applies=_is_sensor,
     update=_drift,
+    shared=True,
     templates=({"drift": 500.0},),
     confusable={"timestamp_latency": "a longer record: the lag of a drift grows"},
 )

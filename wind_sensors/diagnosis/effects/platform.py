@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import (
     HeadingDeviation,
     Instrument,
@@ -15,33 +18,58 @@ from wind_sensors.station.model import (
 
 Entry = Instrument | Platform
 
+DEAD_SHARE = 0.2
+"""A log that shows less than this share of what the positions' change shows is dead."""
+
 
 def _is_platform(entry: Entry, station: Station) -> bool:
     return isinstance(entry, Platform)
 
 
+def log_is_dead(drive: Drive) -> bool:
+    """Whether the positions move and the reported velocity does not."""
+    motion = drive.motion
+    if motion is None or motion.travel is None:
+        return False
+    return bool(np.std(motion.velocity) < DEAD_SHARE * np.std(motion.travel))
+
+
 def _share(entry: Entry, values: Values) -> dict[str, Any]:
-    return {"velocity_share": values["velocity_share"]}
+    assert isinstance(entry, Platform)
+    return {
+        "velocity_share": values["velocity_share"],
+        "position_share": values.get("position_share", entry.position_share),
+    }
+
+
+def _share_size(values: Values) -> float:
+    missing = abs(values["velocity_share"] - 1.0)
+    return max(missing, values.get("position_share", 0.0)) / 0.15
 
 
 PLATFORM_VELOCITY = Effect(
     name="platform_velocity",
     meaning="The carrier's motion is not in the signals, or has been removed already.",
     entrance="wind",
-    equation="apparent wind = wind - share * (V + omega x r)",
+    equation="apparent wind = wind - share * ((1 - q) V + q d(position)/dt + omega x r)",
     source="rigid-body kinematics",
     region="with the carrier's speed and heading",
     parameters=(
         Parameter(
             "velocity_share", "1", -1.0, 2.0, healthy=1.0, minimum=0.15, starts=(0.0,), step=0.02
         ),
+        Parameter(
+            "position_share", "1", 0.0, 1.0, healthy=0.0, starts=(1.0,), step=0.02,
+            free=log_is_dead,
+        ),
     ),
     applies=_is_platform,
     update=_share,
-    templates=({"velocity_share": 0.9},),
+    templates=({"velocity_share": 0.9, "position_share": 0.0},),
     confusable={
         "platform_velocity_scale": "a run at another speed against an independent log",
     },
+    size=_share_size,
 )
 
 

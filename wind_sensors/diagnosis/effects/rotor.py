@@ -110,14 +110,14 @@ BEARING_FRICTION = Effect(
 
 def _density(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor | Angle)
-    return {"reference_density": entry.reference_density * values["density_ratio"]}
+    return {"reference_density": entry.reference_density / values["density_ratio"]}
 
 
 AIR_DENSITY = Effect(
     name="air_density",
     meaning="The air is lighter or denser than in the calibration, and the response not corrected.",
     entrance="response",
-    equation="l0 = l0_cal * rho_cal / rho; friction weighs rho_cal / rho as much",
+    equation="l0 = l0_cal / ratio, ratio = rho / rho_cal; friction weighs 1 / ratio as much",
     source="K94, eq. (6)",
     region="with temperature and pressure; response length and low speeds",
     smooths=True,
@@ -127,7 +127,7 @@ AIR_DENSITY = Effect(
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_density,
     everywhere=True,
-    templates=({"density_ratio": 1.1},),
+    templates=({"density_ratio": 0.9},),
     confusable={
         "rotor_inertia": "a temperature or pressure swing",
         "calibration_drift": "a temperature or pressure swing",

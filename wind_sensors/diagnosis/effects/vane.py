@@ -30,7 +30,7 @@ VANE_FRICTION = Effect(
     smooths=True,
     parameters=(
         Parameter(
-            "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 2.0)
+            "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 1.5, 2.2)
         ),
     ),
     applies=_is_vane,
@@ -120,7 +120,10 @@ VANE_IMBALANCE = Effect(
     source="derived: pendulum term of a vane on a leaning axis",
     region="low speeds, on a mount that leans or accelerates",
     parameters=(
-        Parameter("imbalance", "1/m", -8.0, 8.0, minimum=0.15, step=0.05, starts=(0.5, -0.5)),
+        Parameter(
+            "imbalance", "1/m", -40.0, 40.0, minimum=0.15, step=0.05,
+            starts=(0.5, -0.5, 2.5, -2.5),
+        ),
         Parameter("tilt_x", "deg", -15.0, 15.0, step=0.5),
         Parameter("tilt_y", "deg", -15.0, 15.0, step=0.5),
     ),

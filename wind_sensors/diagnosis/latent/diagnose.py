@@ -68,7 +68,7 @@ def latent_effects(station: Station) -> dict[str, Effect]:
     velocity = found["platform_velocity"]
     parameter = replace(velocity.parameters[0], low=-0.5, high=2.0, healthy=share, starts=())
     found["platform_velocity"] = replace(
-        velocity, parameters=(parameter,), templates=({"velocity_share": share + 0.1},)
+        velocity, parameters=(parameter,), templates=({"velocity_share": share + 0.1},), size=None
     )
     return found
 

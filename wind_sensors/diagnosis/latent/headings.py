@@ -129,8 +129,9 @@ def felt_by(recording: Recording) -> Felt:
     block = np.floor(elapsed / BLOCK).astype(np.intp)
     count = np.bincount(block[good], minlength=int(block.max()) + 1)
     good &= count[block] >= FEWEST_BINS
+    seen = sample.motion
     motion = Motion(
-        *(getattr(sample.motion, name)[good] for name in Motion.__dataclass_fields__)
+        seen.attitude[good], seen.velocity[good], seen.angular_rate[good], seen.position[good]
     )
     return Felt(
         station, rotor.name, vane.name, elapsed[good], -(speed * nose)[good], motion,
