@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparison import BANDS, Comparison
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import PLATFORM
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import log_is_dead
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.station.model import Angle, Rotor, Station
@@ -20,6 +20,10 @@ LONGEST_REPEAT = 4.0
 
 LONGEST_SILENCE = 4.0
 """A rotor without a pulse for longer [s], while it should turn fast, is taken to be silent."""
+
+LEAN = 15.0
+"""Lean of the axis [deg] from which its fit begins: what it does to a rotor grows with its square,
+so that a small lean shows no way."""
 
 _RATE_THAT_TURNS = 1.5
 
@@ -34,6 +38,11 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     if log_is_dead(comparison.drive):
         still = _term("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
         out[still.key] = [still]
+    leans = [
+        _term("axis_tilt", STATION, tilt_x=LEAN * np.cos(towards), tilt_y=LEAN * np.sin(towards))
+        for towards in np.arange(8) * np.pi / 4.0
+    ]
+    out[leans[0].key] = leans
     simulated = comparison.simulate(station)
     for channel in comparison.channels:
         entry = station.instrument(channel.instrument)

@@ -11,6 +11,7 @@ from wind_sensors.diagnosis.explanation import (
     Alternative,
     Judged,
     Naming,
+    evidence,
     judged,
     needed_gain,
     no_terms,
@@ -88,8 +89,13 @@ def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
     return wins and first.evidence < second.evidence - CLEARLY_BETTER
 
 
-def _brings(searcher: Searcher, candidate: Judged, fixed: Sequence[Term]) -> float:
-    """Drop of the penalised cost over the terms before, in the candidate's own null."""
+def _brings(
+    searcher: Searcher, candidate: Judged, fixed: Sequence[Term], before_evidence: float
+) -> float:
+    """What a candidate gains over the terms before: in its own null and in likelihood, the less.
+
+    In its own null alone a flexible effect gains from the noise that it has fitted away.
+    """
     if not plausible(candidate.fit):
         return -np.inf
     whitener = candidate.whitener
@@ -98,7 +104,8 @@ def _brings(searcher: Searcher, candidate: Judged, fixed: Sequence[Term]) -> flo
         if fixed
         else no_terms(whitener, searcher)
     )
-    return total(before) - total(candidate.fit)
+    gain = total(before) - total(candidate.fit)
+    return min(gain, before_evidence - candidate.evidence)
 
 
 def _greedy(
@@ -168,7 +175,8 @@ def _greedy(
                 searcher, passing.whitener, passing.fit.terms[:-1], passing.fit
             )
             ranked[:1] = judged(searcher, [sharper], named)
-        leader = next((r for r in ranked if _brings(searcher, r, fixed) >= needed), None)
+        so_far = evidence(current, whitener)
+        leader = next((r for r in ranked if _brings(searcher, r, fixed, so_far) >= needed), None)
         if leader is None:
             break
         current = leader.fit
