@@ -11,6 +11,9 @@ from test_diagnosis_naming import STATION, baseline, recorded
 from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explanation import judged
+from wind_sensors.diagnosis.fitting import Term, fit
+from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.diagnosis.whitening import form_signatures, trust_of
 from wind_sensors.errors import UserError
@@ -76,3 +79,34 @@ def test_a_rotor_that_runs_away_is_refused_at_once() -> None:
     station = STATION.model_copy(update={"instruments": (cup, STATION.instrument("vane"))})
     with pytest.raises(UserError, match="runs away"):
         respond(station, comparison.drive, ResponseState(rotors={"cup": (600.0, 0.0)}))
+
+
+@pytest.mark.parametrize("instrument", ["vane", "station"])
+def test_a_clock_belongs_to_one_instrument_or_to_all(instrument: str) -> None:
+    station = with_effect(STATION, catalogue()["clock_drift"], instrument, {"drift": 4000.0})
+    (finding,) = diagnose(recorded(station, 64), baseline(), with_proof=False).findings
+    assert finding.term.key == ("clock_drift", instrument)
+    assert finding.parameters["drift"].value == pytest.approx(4000.0, rel=0.2)
+
+
+def test_light_air_makes_a_rotor_slow() -> None:
+    station = with_effect(STATION, catalogue()["air_density"], "station", {"density_ratio": 0.8})
+    light = prepare(recorded(STATION, 65)).respond(station, ("cup",)).rotors["cup"].rate
+    usual = prepare(recorded(STATION, 65)).respond(STATION, ("cup",)).rotors["cup"].rate
+    assert np.std(light) < np.std(usual)
+
+
+def test_the_noise_that_an_explanation_leaves_counts() -> None:
+    # With the cost in the null of the plain station alone, a lightly sticking vane wins over one
+    # that sticks much: it stays closer to the simulation whose noise was taken.
+    planted = with_effect(STATION, catalogue()["vane_friction"], "vane", {"friction_speed": 2.5})
+    recording = recorded(planted, 66, mean=4.0)
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
+    friction = catalogue()["vane_friction"]
+    null = searcher.whitener(searcher.bank.without)
+    fits = [
+        fit(null, STATION, [Term(friction, "vane", {"friction_speed": u})], None, iterations=0)
+        for u in (0.3, 2.5)
+    ]
+    best = judged(searcher, fits, iterations=0)[0]
+    assert best.fit.terms[0].values["friction_speed"] == 2.5

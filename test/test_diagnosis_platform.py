@@ -11,6 +11,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.learning import learn
 from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.estimation import process
 from wind_sensors.recordings.station_files import load_station
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.simulation.trajectories import multirotor
@@ -68,3 +69,21 @@ def test_an_effect_adds_to_what_a_station_already_states() -> None:
     assert (found.thrust, found.disc_area, found.sensor_share) == (20.0, 0.5, 0.2)
     assert found.induced_velocity == 0.5
     assert found.wake_skew == pytest.approx(0.3)
+
+
+def test_a_dead_log_is_found_and_replaced_by_the_positions() -> None:
+    known = learn([flown(uav(), seed) for seed in range(3)])
+    flight = flown(uav(), 51)
+    assert flight.platform is not None
+    still = np.zeros_like(flight.platform.velocity)
+    dead = replace(flight, platform=replace(flight.platform, velocity=still))
+    found = diagnose(dead, known)
+    assert [f.term.effect.name for f in found.findings] == ["platform_velocity"]
+    assert found.station.platform is not None
+    assert found.station.platform.position_share > 0.9
+    whole = process(flight).velocity
+    wrong, right = (
+        np.sqrt(np.mean(np.square(process(replace(dead, station=station)).velocity - whole)))
+        for station in (uav(), found.station)
+    )
+    assert right < 0.3 * wrong

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparison import Simulated
-from wind_sensors.diagnosis.effects.definition import Parameter
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
 from wind_sensors.diagnosis.search import (
     PENALTY_PER_FURTHER_PARAMETER,
@@ -29,10 +28,16 @@ LOUDEST_FACTOR = 1.2
 """A name needs this many times what the loudest of the healthy recordings promises."""
 
 ACCEPTED_FURTHER_GAIN = 32.0
-"""The same for a second and a third effect."""
+"""The same for a second effect on the same signals."""
+
+ACCEPTED_ELSEWHERE_GAIN = 22.0
+"""The same for a second effect on signals that the first does not reach."""
 
 FURTHER_SHARE = 0.05
-"""A further effect must also bring this share of the gain so far."""
+"""A further effect on the same signals must also bring this share of the gain so far."""
+
+LARGEST_INEXACTNESS = 100.0
+"""But never more than this."""
 
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
@@ -50,20 +55,26 @@ def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
     return cost
 
 
-def needed_gain(current: Fit, nothing: float, loudest: float) -> float:
+def needed_gain(current: Fit, loudest: float) -> float:
     """Gain that the next term has to bring.
 
-    After a large effect the simulation's own inexactness is worth a share of its gain.
+    Args:
+        current: The explanation so far.
+        loudest: Largest gain in a healthy recording judged by the others.
+    """
+    least = ACCEPTED_ELSEWHERE_GAIN if current.terms else ACCEPTED_GAIN
+    return max(least, LOUDEST_FACTOR * loudest)
+
+
+def inexact(current: Fit, nothing: float) -> float:
+    """What the simulation's own inexactness is worth on the signals that an effect reaches.
 
     Args:
         current: The explanation so far.
         nothing: Cost without any effect.
-        loudest: Largest gain in a healthy recording judged by the others.
     """
-    if not current.terms:
-        return max(ACCEPTED_GAIN, LOUDEST_FACTOR * loudest)
     share = FURTHER_SHARE * (nothing - current.cost)
-    return max(ACCEPTED_FURTHER_GAIN, LOUDEST_FACTOR * loudest, share)
+    return min(max(share, ACCEPTED_FURTHER_GAIN), LARGEST_INEXACTNESS)
 
 
 @dataclass(frozen=True)
@@ -177,17 +188,16 @@ def judged(
     ]
 
 
-def value_at(term: Term, parameter: Parameter) -> float:
-    """Fitted value of a parameter."""
-    return float(term.values[parameter.name])
-
-
 def plausible(candidate: Fit) -> bool:
     """Whether the newest term is large enough to matter and its parameters are determined.
 
     A search that ran into the bounds of a parameter has found the wrong effect.
     """
-    term = candidate.terms[-1]
+    return is_plausible(candidate.terms[-1])
+
+
+def is_plausible(term: Term) -> bool:
+    """Whether one term is."""
     if term.relative_size < SMALLEST_SIZE:
         return False
     for parameter in term.effect.parameters:
@@ -195,7 +205,7 @@ def plausible(candidate: Fit) -> bool:
             continue
         margin = 0.02 * (parameter.high - parameter.low)
         reach = 0.85 * (parameter.high - 1.0)
-        if parameter.healthy == 1.0 and value_at(term, parameter) > 1.0 + reach:
+        if parameter.healthy == 1.0 and term.values[parameter.name] > 1.0 + reach:
             return False
         value = term.values[parameter.name]
         at_bound = value < parameter.low + margin or value > parameter.high - margin

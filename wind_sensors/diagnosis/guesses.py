@@ -25,6 +25,13 @@ LEAN = 15.0
 """Lean of the axis [deg] from which its fit begins: what it does to a rotor grows with its square,
 so that a small lean shows no way."""
 
+BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift"})
+"""Effects that are tried whether or not the screening sees them."""
+
+DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
+"""Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
+other, and nothing shows the way."""
+
 _RATE_THAT_TURNS = 1.5
 
 
@@ -43,6 +50,10 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
         for towards in np.arange(8) * np.pi / 4.0
     ]
     out[leans[0].key] = leans
+    clocks = [channel.instrument for channel in comparison.channels]
+    for instrument in [*clocks, STATION]:
+        drifts = [_term("clock_drift", instrument, drift=drift) for drift in DRIFTS]
+        out[drifts[0].key] = drifts
     simulated = comparison.simulate(station)
     for channel in comparison.channels:
         entry = station.instrument(channel.instrument)

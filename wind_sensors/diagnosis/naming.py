@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     Alternative,
     Judged,
     Naming,
     evidence,
+    inexact,
+    is_plausible,
     judged,
     needed_gain,
     no_terms,
@@ -24,6 +27,7 @@ from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.screening import screen
 from wind_sensors.diagnosis.search import Searcher
+from wind_sensors.diagnosis.whitening import Whitener
 
 MOST_EFFECTS = 2
 
@@ -108,6 +112,19 @@ def _brings(
     return min(gain, before_evidence - candidate.evidence)
 
 
+def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: Term) -> float:
+    """What a further term must exceed if it acts on signals that the terms so far change."""
+    reached = {
+        name
+        for term in current.terms
+        for name in searcher.comparison.affected(searcher.station, term.instrument)
+    }
+    if further.instrument not in (reached | {STATION, PLATFORM}):
+        return 0.0
+    nothing = whitener.of(searcher.bank.without)
+    return inexact(current, float(nothing @ nothing)) if current.terms else 0.0
+
+
 def _greedy(
     searcher: Searcher, progress: Callable[[float], None] | None, excluded: frozenset[str]
 ) -> Naming:
@@ -134,7 +151,7 @@ def _greedy(
         number = FIRST_CANDIDATES if first else LATER_CANDIDATES
         candidates = [
             starts
-            for starts in searcher.single_candidates(whitener, current.vector, number)
+            for starts in searcher.single_candidates(whitener, current.vector, number, first)
             if starts[0].key not in used
             and starts[0].effect.name not in excluded
             and not is_a_stall(searcher, current, starts[0])
@@ -153,10 +170,7 @@ def _greedy(
                 break
         fits = searcher.fit_all(whitener, fixed, [*candidates, *windowed])
         fits = sorted((f for f in fits if plausible(f)), key=total)
-        nothing_now = whitener.of(searcher.bank.without)
-        needed = needed_gain(
-            current, float(nothing_now @ nothing_now), searcher.baseline.loudest_gain
-        )
+        needed = needed_gain(current, searcher.baseline.loudest_gain)
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
         if not fits or total(current) - total(fits[0]) < WORTH_JUDGING * needed:
@@ -176,7 +190,15 @@ def _greedy(
             )
             ranked[:1] = judged(searcher, [sharper], named)
         so_far = evidence(current, whitener)
-        leader = next((r for r in ranked if _brings(searcher, r, fixed, so_far) >= needed), None)
+        leader = next(
+            (
+                r
+                for r in ranked
+                if _brings(searcher, r, fixed, so_far)
+                >= max(needed, _inexactness(searcher, whitener, current, r.fit.terms[-1]))
+            ),
+            None,
+        )
         if leader is None:
             break
         current = leader.fit
@@ -198,6 +220,7 @@ def _greedy(
             current, alternatives = swapped(searcher, whitener, current)
         else:
             alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
+    current = _without_implausible(searcher, whitener, current)
     if current.terms:
         current = with_interval(searcher, current)
         whitener = searcher.whitener(current.simulated)
@@ -214,6 +237,20 @@ def _greedy(
         current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
         alternatives, screened,
     )  # fmt: skip
+
+
+def _without_implausible(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit without terms that ran into their bounds when all were fitted together."""
+    nothing = no_terms(whitener, searcher)
+    needed = needed_gain(nothing, searcher.baseline.loudest_gain)
+    while not all(is_plausible(term) for term in current.terms):
+        kept = [term for term in current.terms if is_plausible(term)]
+        if not kept:
+            return nothing
+        current = fit(whitener, searcher.station, kept, searcher.bank.without)
+        if total(nothing) - total(current) < needed:
+            return nothing
+    return current
 
 
 def is_a_stall(searcher: Searcher, current: Fit, start: Term) -> bool:

@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.fitting import Fit, Term, fit, planted
+from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.screening import (
     group_templates,
     screen,
@@ -135,9 +136,16 @@ class Searcher:
         return whitener.through_standing(self.bank.whitened(self.comparison, whitener.trust))
 
     def single_candidates(
-        self, whitener: Whitener, vector: FloatArray, number: int
+        self, whitener: Whitener, vector: FloatArray, number: int, blind: bool = False
     ) -> list[list[Term]]:
-        """Starting points of the most promising effects, several for each."""
+        """Starting points of the most promising effects, several for each.
+
+        Args:
+            whitener: The null.
+            vector: What is to be explained.
+            number: Of effects.
+            blind: Try those as well of which a small size shows no way.
+        """
         signatures = self.white_signatures(whitener)
         scores = screen(self.bank.templates, signatures, vector)
         groups = group_templates(self.bank.templates)
@@ -172,7 +180,7 @@ class Searcher:
         for key, guesses in self.guesses.items():
             if key in chosen:
                 next(s for s in out if s[0].key == key).extend(guesses)
-            else:
+            elif blind or key[0] not in BLIND_EFFECTS:
                 out.append(list(guesses))
         return out
 

@@ -10,7 +10,7 @@ from wind_sensors.estimation.intake import Block
 from wind_sensors.motion import Motion, PlatformTrack, TrackLimits, rotations, true_motion
 from wind_sensors.motion.downwash import rotor_downwash
 from wind_sensors.motion.relative_wind import sensor_rotation, sensor_velocity
-from wind_sensors.station.model import Clock, Downwash, Platform, Station
+from wind_sensors.station.model import STANDARD_DENSITY, Clock, Downwash, Platform, Station
 from wind_sensors.station.signals import PlatformStates
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,8 +20,6 @@ GAS_CONSTANT_DRY_AIR = 287.05
 """[J kg^-1 K^-1]"""
 STANDARD_PRESSURE = 101_325.0
 """[Pa]"""
-STANDARD_DENSITY = 1.225
-"""[kg/m^3]"""
 STANDARD_TEMPERATURE = 15.0
 """[deg C]"""
 STANDARD_GRAVITY = 9.80665
@@ -69,9 +67,10 @@ class CircumstanceSource:
 
     def _air(self, rows: FloatArray) -> None:
         rows[:, forward.AIR_TEMPERATURE] = STANDARD_TEMPERATURE
-        rows[:, forward.AIR_DENSITY] = self.station.instruments[0].reference_density
         if not self._use_air:
+            rows[:, forward.AIR_DENSITY] = self.station.instruments[0].reference_density
             return
+        rows[:, forward.AIR_DENSITY] = STANDARD_DENSITY
         if np.isfinite(self._temperature):
             rows[:, forward.AIR_TEMPERATURE] = self._temperature
             pressure = self._pressure if np.isfinite(self._pressure) else STANDARD_PRESSURE

@@ -37,7 +37,7 @@ class Drive:
         wind: Wind at the sensor, ENU [m/s], shape (n, 3).
         motion: The platform as it is reported, or None on a mast.
         temperature: [deg C], shape (n,); None: the instruments' reference temperature.
-        density: Air density [kg/m^3], shape (n,); None: the calibration's.
+        density: Air density [kg/m^3], shape (n,); None: the standard density.
         elapsed: Seconds from the start of the recording to the first instant; changes, outages and
             drifting clocks count from there.
         motion_is_true: `motion` is what the platform does, not what it reports.

@@ -19,7 +19,16 @@ from wind_sensors.instruments.dynamics.vane import integrate_vane, propeller_van
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.wind_at_sensor import Flow, WindAtSensors
 from wind_sensors.station.changes import Segment, segments
-from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Rotor, Station, Vane
+from wind_sensors.station.model import (
+    STANDARD_DENSITY,
+    Angle,
+    Bivane,
+    Cup,
+    Propeller,
+    Rotor,
+    Station,
+    Vane,
+)
 from wind_sensors.station.parameters import rotor_parameters, vane_parameters
 
 FloatArray = npt.NDArray[np.float64]
@@ -283,7 +292,7 @@ class _Worker:
 
     def _density_ratio(self, reference: float) -> FloatArray:
         if self._drive.density is None:
-            return np.ones(len(self._drive))
+            return np.full(len(self._drive), STANDARD_DENSITY / reference)
         return self._drive.density / reference
 
     def _turned(

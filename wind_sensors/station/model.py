@@ -18,6 +18,10 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 Vector3 = tuple[float, float, float]
 
 
+STANDARD_DENSITY = 1.225
+"""Air density of a calibration, and of air of which nothing is known [kg/m^3]."""
+
+
 class Entry(BaseModel):
     """A part of the station file: unknown keys are errors, values do not change."""
 
@@ -155,7 +159,7 @@ class Rotor(Instrument):
     """Distance of the cups' or blades' middle from the axis [m]."""
     a4: float = Field(default=1.0, gt=-1.0, lt=3.0)
     """Share of the torque's slope that follows the wind; 1 follows Kristensen et al. (2014)."""
-    reference_density: Positive = 1.225
+    reference_density: Positive = STANDARD_DENSITY
     """Air density of the calibration [kg/m^3]."""
     calibration_gain: Positive = 1.0
     """Steady rate relative to the calibration's."""
@@ -232,7 +236,7 @@ class Angle(Instrument):
     """l_v [m], at the reference density."""
     damping_ratio: Positive
     """zeta, 1 at critical damping."""
-    reference_density: Positive = 1.225
+    reference_density: Positive = STANDARD_DENSITY
     """Air density of `distance_constant` [kg/m^3]."""
     inertia_factor: Positive = 1.0
     """Moment of inertia relative to the healthy vane's."""
