@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explanation import ACCEPTED_GAIN, Alternative, Naming
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
 from wind_sensors.diagnosis.proof import Proof, prove
@@ -36,6 +36,9 @@ EQUAL_LIKELIHOOD = 3.0
 EQUAL_SHARE = 0.02
 """So are those that miss the winner by less than this share of its gain: the simulation is not
 exact enough to tell them apart."""
+
+LEAST_REMOVED = 0.5
+"""Share of the excess misfit that held-out blocks must lose to an effect that no region shows."""
 
 LEAST_LIKENESS = 0.6
 """Cosine between the white corrections of two explanations of the same thing."""
@@ -157,13 +160,13 @@ class Diagnosis:
     bank: RegionBank | None = field(default=None, repr=False)
 
 
-def _estimates(naming: Naming) -> list[dict[str, Estimate]]:
+def _estimates(explanation: Fit) -> list[dict[str, Estimate]]:
     out = []
     place = 0
-    for term in naming.fit.terms:
+    for term in explanation.terms:
         found = {}
         for parameter in term.effect.parameters:
-            variance = float(naming.fit.covariance[place, place])
+            variance = float(explanation.covariance[place, place])
             value = term.values[parameter.name]
             departure = 0.0 if parameter.healthy is None else value - parameter.healthy
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
@@ -366,6 +369,10 @@ def diagnose(
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
+    refuted = findings and not _borne_out(findings)
+    if refuted:
+        refuted_names = ", ".join(f.term.effect.name for f in findings)
+        verdict, findings = "none", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)
@@ -376,6 +383,11 @@ def diagnose(
         description = _description(after[0])
     if calm:
         description = TOO_CALM
+    if refuted:
+        description = (
+            f"{refuted_names} would fit, but no region stands out and blocks that were not fitted "
+            "do not bear it out"
+        )
     return Diagnosis(
         recording=recording.name,
         verdict=verdict,
@@ -394,6 +406,13 @@ def diagnose(
     )
 
 
+def _borne_out(findings: tuple[Finding, ...]) -> bool:
+    """Whether a region of the data or held-out blocks speak for the findings."""
+    proofs = [f.proof for f in findings if f.proof is not None]
+    located = any(f.p < REMAINDER_P for f in findings)
+    return located or not proofs or proofs[0].excess_removed > LEAST_REMOVED
+
+
 def _findings(
     naming: Naming,
     equal: list[tuple[int, Alternative]],
@@ -403,7 +422,7 @@ def _findings(
     with_proof: bool,
 ) -> tuple[Finding, ...]:
     whitener = naming.whitener
-    estimates = _estimates(naming)
+    estimates = _estimates(naming.fit)
     behind = tuple(
         (a.fit.terms[-1].effect.name, a.fit.terms[-1].instrument, 0.5 * a.behind)
         for a in naming.alternatives
@@ -434,10 +453,7 @@ def _findings(
     for position, alternative in equal:
         term = alternative.fit.terms[-1]
         rival = out[position]
-        values = {
-            p.name: Estimate(term.values[p.name], float("nan"), float("nan"), p.unit)
-            for p in term.effect.parameters
-        }
+        values = _estimates(alternative.fit)[-1]
         out.append(
             Finding(
                 term, values, rival.located, rival.share, rival.p,
