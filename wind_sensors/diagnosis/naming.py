@@ -100,7 +100,7 @@ def _brings(
 
     In its own null alone a flexible effect gains from the noise that it has fitted away.
     """
-    if not plausible(candidate.fit):
+    if not plausible(candidate.fit) or searcher.is_a_way_of_the_wind(candidate.fit.terms[-1]):
         return -np.inf
     whitener = candidate.whitener
     before = (
