@@ -53,6 +53,10 @@ MAST: dict[str, Case] = {
     "gap with a reading": Case(
         vane={"gap_centre_deg": 205.0, "gap_width_deg": 15.0, "gap_reading_deg": 0.0}, turn=20.0
     ),
+    "gap with a loose wiper": Case(
+        vane={"gap_centre_deg": 205.0, "gap_width_deg": 15.0, "gap_reading_deg": "floating"},
+        rms=1.1,
+    ),
     "quantisation": Case(vane={"quantisation_deg": 8.0}),
     "imbalance on a leaning axis": Case(
         vane={"imbalance": 5.0, "tilt_deg": (4.0, -4.0)}, turn=0.8

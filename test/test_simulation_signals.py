@@ -300,6 +300,9 @@ def test_a_dead_gap_holds_its_edges_or_its_reading():
     np.testing.assert_allclose(held, expected, atol=1e-12)
     zeroed = read(vane(**gap, gap_reading_deg=0.0), turned)
     np.testing.assert_allclose(zeroed, np.where(inside, 0.0, turned), atol=1e-12)
+    loose = read(vane(**gap, gap_reading_deg="floating"), turned)
+    np.testing.assert_allclose(loose[~inside], turned[~inside], atol=1e-12)
+    assert np.ptp(loose[inside]) > 3.0
 
 
 def test_a_filter_lags_a_ramp_by_its_time_constant():

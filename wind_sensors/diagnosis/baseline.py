@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STILLNESS, Channel
+from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STILLNESS, Channel
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -21,14 +21,16 @@ FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 _BANDS = len(NORMALISED_BANDS) - 1
 _SPECTRUM_PRIOR = 0.22
 _INTERVAL_PRIOR = np.array([0.002, 0.002, 0.003, 0.001, 0.0007, 0.001])
-_STILLNESS_PRIOR = 0.12
+_STILLNESS_PRIOR = 0.03
+_ERRATIC_PRIOR = 0.003
 
 
 def statistics_prior(channel: Channel) -> FloatArray:
     """Standard deviations expected of a channel's statistics before any healthy recording."""
     bands = np.full(_BANDS, _SPECTRUM_PRIOR)
     if channel.kind == "vane_angle":
-        return np.concatenate((bands, np.full(STILLNESS, _STILLNESS_PRIOR)))
+        still = np.full(STILLNESS, _STILLNESS_PRIOR)
+        return np.concatenate((bands, still, np.full(ERRATIC, _ERRATIC_PRIOR)))
     return np.concatenate((bands, _INTERVAL_PRIOR))
 
 

@@ -24,6 +24,7 @@ from wind_sensors.diagnosis.observation import (
     Grid,
     angle_series,
     channels_of,
+    erratic_statistics,
     interval_statistics,
     rate_series,
     stillness_statistics,
@@ -35,7 +36,7 @@ from wind_sensors.simulation.pulses import rotor_signals
 from wind_sensors.simulation.response import Response, respond
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.model import Propeller, Rotor, Station
-from wind_sensors.station.signals import Angles, Pulses, Recording
+from wind_sensors.station.signals import Angles, Pulses, Recording, erratic
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -230,6 +231,7 @@ class Comparison:
                         stillness_statistics(
                             deviation + self.direction, self.speed, self.mask
                         ),
+                        erratic_statistics(readings, self.direction, self.grid, self.mask),
                     )
                 )
             series[channel.name] = values
@@ -258,7 +260,12 @@ class Comparison:
             return np.full(BANDS, np.nan)
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
-        deviation = np.nan_to_num(np.angle(np.exp(1j * (readings.angle - around))))
+        deviation = np.angle(np.exp(1j * (readings.angle - around)))
+        good = np.isfinite(deviation) & ~erratic(readings)
+        if not good.any():
+            return np.full(BANDS, np.nan)
+        if not good.all():
+            deviation = np.interp(time, time[good], deviation[good])
         deviation = self._nearest_turn(channel, deviation, time)
         weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
         return self._log_spectrum(

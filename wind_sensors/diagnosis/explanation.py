@@ -188,6 +188,21 @@ def judged(
     ]
 
 
+def may_join(further: Term, terms: Sequence[Term]) -> bool:
+    """Whether a term says something that others do not say already."""
+    return all(
+        further.key != term.key
+        and not (
+            further.instrument == term.instrument
+            and (
+                further.effect.name in term.effect.contains
+                or term.effect.name in further.effect.contains
+            )
+        )
+        for term in terms
+    )
+
+
 def plausible(candidate: Fit) -> bool:
     """Whether the newest term is large enough to matter and its parameters are determined.
 

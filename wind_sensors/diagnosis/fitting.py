@@ -21,6 +21,8 @@ ALWAYS: Interval = (0.0, None)
 
 _LARGEST_DAMPING = 1e5
 
+_LEAST_INFORMATION = 1e-4
+
 
 @dataclass(frozen=True)
 class Term:
@@ -72,7 +74,8 @@ class Fit:
         cost: Squared length of the white vector (minus twice the log-likelihood).
         vector: White vector at the fit.
         simulated: Simulation at the fit.
-        covariance: Of all parameters, in the order of the terms and their parameters.
+        covariance: Of all parameters, in the order of the terms and their parameters; infinite
+            variance where the recording cannot see one.
         evaluations: Number of simulations it took.
         active: Number of parameters that the recording can see.
     """
@@ -201,6 +204,8 @@ def fit(
         tied = parameter.free is not None and not parameter.free(whitener.comparison.drive)
         if (tied or parameter.swing > swing) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
+        elif not parameter.fitted:
+            low[k] = high[k] = values_of(terms)[k]
     values = np.clip(values_of(terms), low, high)
     cost, vector, first = problem.trial(values)
     if first is None:
@@ -233,11 +238,11 @@ def fit(
             damping *= 8.0
         if not improved or gained < 0.02 + 1e-5 * cost:
             break
-    information = normal / np.outer(scale, scale)
+    seen = np.diag(normal) > _LEAST_INFORMATION
+    covariance = np.diag(np.where(seen, 0.0, np.inf))
     width = np.array([p.high - p.low for p in parameters])
-    covariance = np.asarray(
-        np.linalg.pinv(information + np.diag(1e-9 / width**2)), dtype=np.float64
-    )
+    information = normal / np.outer(scale, scale) + np.diag(1e-9 / width**2)
+    covariance[np.ix_(seen, seen)] = np.linalg.pinv(information[np.ix_(seen, seen)])
     fitted = _with_values(terms, values)
-    active = int(np.count_nonzero(np.diag(normal) > 1e-4))
+    active = int(np.count_nonzero(seen))
     return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations, active)

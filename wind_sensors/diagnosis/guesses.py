@@ -10,7 +10,9 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import log_is_dead
 from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.station.model import Angle, Rotor, Station
+from wind_sensors.station.signals import erratic
 
 FloatArray = npt.NDArray[np.float64]
 Guesses = dict[tuple[str, str], list[Term]]
@@ -31,6 +33,9 @@ BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift"})
 DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
 other, and nothing shows the way."""
+
+LEAST_ERRATIC = 0.004
+"""Share of erratic readings from which a gap with a floating wiper is considered."""
 
 _RATE_THAT_TURNS = 1.5
 
@@ -65,7 +70,11 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
             ]
         else:
             assert isinstance(entry, Angle)
-            terms = [*_reading_guesses(comparison, entry), *_repeats(comparison, entry)]
+            terms = [
+                *_floating(comparison, channel),
+                *_reading_guesses(comparison, entry),
+                *_repeats(comparison, entry),
+            ]
         for term in terms:
             out.setdefault(term.key, []).append(term)
     return out
@@ -103,9 +112,19 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
                 bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
             )
         )  # fmt: skip
-    scatter = comparison.measured.statistics[f"{rotor.name}/rotor_rate"][BANDS + 2]
-    if rotor.pulses_per_revolution > 2 and scatter > 0.01:
-        out.append(_term("encoder_slot_error", rotor.name, scatter=0.7 * float(scatter)))
+    scatter, once = comparison.measured.statistics[f"{rotor.name}/rotor_rate"][
+        BANDS + 2 : BANDS + 4
+    ]
+    slots = rotor.pulses_per_revolution
+    if slots > 2 and max(scatter, once) > 0.01:
+        # An interval is the difference of two slots' displacements.
+        out.append(
+            _term(
+                "encoder_slot_error", rotor.name,
+                scatter=float(scatter) / np.sqrt(2.0),
+                once_per_turn=float(once) / (2.0 * np.sin(np.pi / slots)),
+            )
+        )  # fmt: skip
     return out
 
 
@@ -162,31 +181,61 @@ def _reading_guesses(comparison: Comparison, vane: Angle) -> list[Term]:
         if np.sum(counts) / values.size > 8.0 and step > 0.3:
             out.append(_term("quantisation", vane.name, step=step))
     common = values[counts > max(0.004 * readings.size, 20)]
+    hole = _hole(degrees)
+    if hole is not None:
+        out.append(_gap(vane.name, *hole))
     if 1 <= common.size <= 3:
         low, high = float(common.min()), float(common.max())
         if common.size == 1:
-            out.extend(
-                _term("potentiometer_gap", vane.name, centre=low + 5.0 * side, width=10.0)
-                for side in (-1.0, 1.0)
-            )
+            beside = [(low + 5.0 * side, 10.0) for side in (-1.0, 1.0)]
+            if hole is None:
+                out.extend(_gap(vane.name, *sector) for sector in beside)
+            sectors = beside if hole is None else [hole]
+            out.extend(_gap(vane.name, *sector, 1, low) for sector in sectors)
         else:
             width = high - low
             centre = 0.5 * (low + high)
             if width > 180.0:
                 width, centre = 360.0 - width, centre + 180.0
             if width < 90.0:
-                out.append(_term("potentiometer_gap", vane.name, centre=centre, width=width))
-    hole = _hole(degrees)
-    if hole is not None:
-        out.append(_term("potentiometer_gap", vane.name, centre=hole[0], width=hole[1]))
+                out.append(_gap(vane.name, centre, width))
     return out
+
+
+def _gap(
+    vane: str, centre: float, width: float, form: int = 0, reading: float = 0.0
+) -> Term:
+    return _term(
+        "potentiometer_gap", vane, centre=centre, width=width, reading=reading, form=float(form)
+    )
+
+
+def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
+    """A gap where readings jump about, in the sector in which they do."""
+    angles = comparison.recording.angles[channel.instrument]
+    wrong = erratic(angles)
+    if np.mean(wrong) < LEAST_ERRATIC:
+        return []
+    heading = comparison.direction + comparison.expected.get(channel.name, 0.0)
+    at = np.interp(
+        comparison.grid.seconds(angles.time[wrong]), comparison.grid.centres, heading
+    )
+    centre = float(np.angle(np.mean(np.exp(1j * at))))
+    away = np.angle(np.exp(1j * (at - centre)))
+    low, middle, high = np.degrees(np.quantile(away, (0.1, 0.5, 0.9)))
+    width = float(np.clip(high - low, 3.0, 90.0))
+    return [_gap(channel.instrument, np.degrees(centre) + middle, width, 2)]
 
 
 def _hole(degrees: FloatArray) -> tuple[float, float] | None:
     """Centre and width of a sector without readings between sectors with many [deg]."""
     counts, _ = np.histogram(np.mod(degrees, 360.0), bins=360, range=(0.0, 360.0))
-    around = np.convolve(np.concatenate((counts[-20:], counts, counts[:20])), np.ones(41), "valid")
-    empty = (counts < 0.03 * around / 41.0) & (around > 0.02 * degrees.size)
+    # A reading that comes again and again is no wind.
+    counts = np.minimum(counts, 5.0 * np.median(counts[counts > 0]))
+    beside = np.convolve(np.concatenate((counts[-20:], counts, counts[:20])), np.ones(20), "valid")
+    below, above = beside[:360], beside[21:381]
+    least = 0.015 * np.sum(counts)
+    empty = (counts < 0.03 * (below + above) / 40.0) & (below > least) & (above > least)
     if not empty.any():
         return None
     doubled = np.concatenate((empty, empty))

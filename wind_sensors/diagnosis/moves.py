@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.explanation import (
     Judged,
     evidence,
     judged,
+    may_join,
     no_terms,
     plausible,
     total,
@@ -97,11 +98,10 @@ def swapped(
     for k in range(len(current.terms)):
         others = [t for j, t in enumerate(current.terms) if j != k]
         without = fit(whitener, searcher.station, others, searcher.bank.without, iterations=3)
-        used = {t.key for t in current.terms}
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
-            if starts[0].key not in used
+            if may_join(starts[0], others) and starts[0].key != current.terms[k].key
         ]
         rivals = [
             f for f in searcher.fit_all(whitener, without.terms, candidates) if plausible(f)

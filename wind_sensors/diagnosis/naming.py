@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.explanation import (
     inexact,
     is_plausible,
     judged,
+    may_join,
     needed_gain,
     no_terms,
     plausible,
@@ -152,14 +153,14 @@ def _greedy(
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, current.vector, number, first)
-            if starts[0].key not in used
+            if may_join(starts[0], fixed)
             and starts[0].effect.name not in excluded
             and not is_a_stall(searcher, current, starts[0])
         ]
         windowed = [
             starts
             for starts in window_starts(searcher, whitener, current.vector, used)
-            if starts[0].effect.name not in excluded
+            if may_join(starts[0], fixed) and starts[0].effect.name not in excluded
         ]
         if not first and not windowed:
             scores = screen(

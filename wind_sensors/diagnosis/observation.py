@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
 from wind_sensors.station.model import Angle, Cup, Propeller, Rotor, Station
-from wind_sensors.station.signals import Angles, Pulses
+from wind_sensors.station.signals import Angles, Pulses, erratic
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -97,8 +97,9 @@ def channels_of(station: Station) -> tuple[Channel, ...]:
 def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArray:
     """Wind speed that the turns within each bin mean, l times rotor rate [m/s], shape (n,).
 
-    The rotor is taken to turn evenly between two pulses; before the first and after the last it
-    stands.
+    Times and turns are averaged over a revolution of pulses, so that slots and cups that differ do
+    not beat with the bins. In between the rotor is taken to turn evenly, and as fast before the
+    first and after the last for two pulses more; beyond that it stands.
     """
     time = grid.seconds(pulses.time)
     if time.size < 2:
@@ -110,10 +111,31 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
     if np.any(np.diff(time) < 0.0):
         order = np.argsort(time, kind="stable")
         time, turns = time[order], np.sort(turns)
-    at = np.interp(grid.edges, time, turns)
+    slots = min(rotor.pulses_per_revolution, time.size - 1)
+    beyond = 0.5 * (slots - 1) + 2.0
+    at = np.interp(
+        grid.edges,
+        _continued(_over_a_turn(time, slots), beyond),
+        _continued(_over_a_turn(turns, slots), beyond),
+    )
     return np.asarray(
         np.diff(at) * (2.0 * np.pi * rotor.calibration_distance / grid.dt), dtype=np.float64
     )
+
+
+def _over_a_turn(values: FloatArray, slots: int) -> FloatArray:
+    """Means of so many successive values."""
+    if slots < 2:
+        return values
+    total = np.cumsum(np.concatenate(([0.0], values - values[0])))
+    return np.asarray((total[slots:] - total[:-slots]) / slots + values[0], dtype=np.float64)
+
+
+def _continued(values: FloatArray, steps: float) -> FloatArray:
+    """Values with a straight continuation by so many steps at both ends."""
+    before = values[0] - steps * (values[1] - values[0])
+    after = values[-1] + steps * (values[-1] - values[-2])
+    return np.concatenate(([before], values, [after]))
 
 
 def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
@@ -128,7 +150,7 @@ def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
         Deviations within (-pi, pi], continued where a bin holds no reading.
     """
     time = grid.seconds(angles.time)
-    usable = np.isfinite(angles.angle)
+    usable = np.isfinite(angles.angle) & ~erratic(angles)
     time, reading = time[usable], angles.angle[usable]
     index = np.floor(time / grid.dt).astype(np.intp)
     inside = (index >= 0) & (index < grid.n)
@@ -145,6 +167,37 @@ def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
     return np.asarray(mean, dtype=np.float64)
 
 
+ERRATIC = 3
+"""Number of statistics of erratic readings."""
+
+
+def erratic_statistics(
+    angles: Angles, around: FloatArray, grid: Grid, mask: FloatArray | None = None
+) -> FloatArray:
+    """How much of the time a vane's readings jump about, and where it should point then.
+
+    Args:
+        angles: Readings.
+        around: Slow heading at the bins' centres [rad, continuous], shape (n,).
+        grid: Bins.
+        mask: Weight of the bins; those below a half do not count.
+
+    Returns:
+        Share of the readings; mean cosine and sine of the heading, zero for good readings.
+    """
+    place = np.floor(grid.seconds(angles.time) / grid.dt).astype(np.intp)
+    inside = (place >= 0) & (place < grid.n)
+    if mask is not None:
+        inside[inside] = mask[place[inside]] > 0.5
+    wrong = erratic(angles)[inside].astype(np.float64)
+    if wrong.size == 0 or not wrong.any():
+        return np.zeros(ERRATIC)
+    heading = around[place[inside]]
+    return np.array(
+        [np.mean(wrong), np.mean(wrong * np.cos(heading)), np.mean(wrong * np.sin(heading))]
+    )
+
+
 STILLNESS = 3
 """Number of statistics of how still a vane stands between its movements."""
 
@@ -152,7 +205,7 @@ STILLNESS = 3
 def stillness_statistics(
     series: FloatArray, speed: FloatArray, mask: FloatArray | None = None
 ) -> FloatArray:
-    """How still a vane stands between its movements: small turns against large ones.
+    """How often a vane hardly moves: the share of small turns, against its large ones.
 
     Args:
         series: Angle in each bin [rad], shape (n,).
@@ -160,10 +213,10 @@ def stillness_statistics(
         mask: Weight of the bins; those below a half do not count.
 
     Returns:
-        Logarithms of the ratios of quantiles (25 to 75 %, 10 to 50 %) of the turns from bin to bin
-        in the slowest third of the record, and the first for the rest.
+        Shares of turns from bin to bin below 7 and 20 % of what every tenth of them exceeds, in the
+        slowest third of the record; the first of them for the rest.
     """
-    turns = np.abs(np.diff(series)) + 1e-6
+    turns = np.abs(np.diff(series))
     if mask is not None:
         turns, speed = turns[mask[1:] > 0.5], speed[mask > 0.5]
         speed = speed[: turns.size]
@@ -176,10 +229,9 @@ def stillness_statistics(
     out = np.zeros(STILLNESS)
     if np.count_nonzero(slow) < 50:
         return out
-    q = np.quantile(turns[slow], (0.1, 0.25, 0.5, 0.75))
-    out[0], out[1] = np.log(q[1] / q[3]), np.log(q[0] / q[2])
-    q = np.quantile(turns[~slow], (0.25, 0.75))
-    out[2] = np.log(q[0] / q[1])
+    large = float(np.quantile(turns[slow], 0.9))
+    out[0], out[1] = np.mean(turns[slow] <= 0.07 * large), np.mean(turns[slow] <= 0.2 * large)
+    out[2] = np.mean(turns[~slow] <= 0.07 * float(np.quantile(turns[~slow], 0.9)))
     return out
 
 
@@ -200,10 +252,10 @@ def interval_statistics(
         mask: Weight of the bins; intervals where it is below a half do not count.
 
     Returns:
-        Share of intervals over 1.6 and under 0.4 times their neighbourhood's mean; relative
-        scatter of the slots' mean intervals; amplitude of the relative interval once per
-        revolution locked to the slot, once and twice per revolution locked to the wind's
-        direction (0 where the pulses are too few to tell).
+        Share of intervals over 1.6 and under 0.4 times their neighbourhood's mean; of the slots'
+        mean relative intervals the scatter without, and the amplitude of, the part that swings
+        once per revolution; of what departs from those means the amplitudes once and twice per
+        revolution locked to the wind's direction (0 where the pulses are too few to tell).
     """
     weight = np.ones(grid.n) if mask is None else mask
     return _interval_statistics(
@@ -247,7 +299,9 @@ def _interval_statistics(
     angle = 2.0 * math.pi / slots * np.arange(slots)
     slot_cos, slot_sin = np.cos(angle), np.sin(angle)
     wind_cos, wind_sin = np.cos(direction), np.sin(direction)
-    slot_x, slot_y, once_x, once_y, twice_x, twice_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    locked = np.zeros(4)
+    away = np.zeros((slots, 4))
+    seen = np.empty(4)
     first = slots // 2
     slot = first - 1
     kept = 0
@@ -265,21 +319,26 @@ def _interval_statistics(
         squares += deviation * deviation
         kept += 1
         c, s = slot_cos[slot], slot_sin[slot]
-        slot_x += deviation * c
-        slot_y += deviation * s
-        away_cos = c * wind_cos[place] + s * wind_sin[place]
-        away_sin = s * wind_cos[place] - c * wind_sin[place]
-        once_x += deviation * away_cos
-        once_y += deviation * away_sin
-        twice_x += deviation * (away_cos * away_cos - away_sin * away_sin)
-        twice_y += deviation * 2.0 * away_cos * away_sin
+        seen[0] = c * wind_cos[place] + s * wind_sin[place]
+        seen[1] = s * wind_cos[place] - c * wind_sin[place]
+        seen[2] = seen[0] * seen[0] - seen[1] * seen[1]
+        seen[3] = 2.0 * seen[0] * seen[1]
+        for m in range(4):
+            locked[m] += deviation * seen[m]
+            away[slot, m] += seen[m]
     if kept < 100:
         return out
     means = total / np.maximum(number, 1.0)
-    variance = squares / kept - (np.sum(total) / kept) ** 2
-    out[2] = math.sqrt(max(np.var(means) - variance * slots / kept, 0.0))
-    out[3] = 2.0 * math.hypot(slot_x, slot_y) / kept
-    out[4] = 2.0 * math.hypot(once_x, once_y) / kept
+    for m in range(4):
+        # What is fixed to the disc says nothing about the wind's direction.
+        locked[m] -= np.sum(means * away[:, m])
+    error = max(squares / kept - np.mean(means**2), 0.0) / kept
+    once = (2.0 * np.sum(means * slot_cos) / slots) ** 2
+    once += (2.0 * np.sum(means * slot_sin) / slots) ** 2
+    once = max(once - 4.0 * error, 0.0)
+    out[2] = math.sqrt(max(np.var(means) - 0.5 * once - error * slots, 0.0))
+    out[3] = math.sqrt(once)
+    out[4] = 2.0 * math.hypot(locked[0], locked[1]) / kept
     if slots > 4:
-        out[5] = 2.0 * math.hypot(twice_x, twice_y) / kept
+        out[5] = 2.0 * math.hypot(locked[2], locked[3]) / kept
     return out

@@ -167,17 +167,20 @@ def _estimates(explanation: Fit) -> list[dict[str, Estimate]]:
         found = {}
         for parameter in term.effect.parameters:
             variance = float(explanation.covariance[place, place])
+            # A parameter that the recording does not see has no estimate.
             value = term.values[parameter.name]
             departure = 0.0 if parameter.healthy is None else value - parameter.healthy
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
             error = INTERVAL_FACTOR * float(np.hypot(noise, FORM_ERROR * departure))
+            place += 1
+            if not np.isfinite(error):
+                continue
             found[parameter.name] = Estimate(
                 value,
                 max(value - error, parameter.low),
                 min(value + error, parameter.high),
                 parameter.unit,
             )
-            place += 1
         out.append(found)
     return out
 

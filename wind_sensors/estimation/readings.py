@@ -11,6 +11,7 @@ from wind_sensors.estimation.constants import axes_of
 from wind_sensors.estimation.intake import Series
 from wind_sensors.estimation.timeline import Timeline
 from wind_sensors.station.model import Angle, Station
+from wind_sensors.station.signals import Angles, BoolArray, erratic
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -19,6 +20,12 @@ _SHARE_OF_FILTER = 0.25
 _LONGEST_STEP = 0.2
 """Readings behind a low-pass filter are compared over this share of its time constant, at most so
 long [s]: long enough for noise not to swamp their difference."""
+
+LOOSE_STEP = np.radians(25.0)
+"""Jump of a wiper that is known to float [rad]."""
+
+_RECENT_READINGS = 8
+"""So many of the last block's readings are remembered to see jumps at a block's beginning."""
 
 
 class Headings(NamedTuple):
@@ -46,7 +53,9 @@ def wrapped(angle: FloatArray) -> FloatArray:
     return out
 
 
-def headings(vane: Angle, time: TimeArray, reading: FloatArray, origin: int) -> Headings:
+def headings(
+    vane: Angle, time: TimeArray, reading: FloatArray, origin: int, loose: BoolArray | None = None
+) -> Headings:
     """Undo sensor and mounting.
 
     Args:
@@ -54,16 +63,21 @@ def headings(vane: Angle, time: TimeArray, reading: FloatArray, origin: int) -> 
         time: Of the measurements [ns], shape (n,).
         reading: As delivered [rad], shape (n,).
         origin: Start of the recording [ns]; outages count from there.
+        loose: Readings that jump about; None: as far as these readings show it.
 
     Returns:
         Readings outside outages. One inside the potentiometer's gap says only that the nose is
-        somewhere in the gap, or in its nearer half where the reading stays at the edge.
+        somewhere in the gap, or in its nearer half where the reading stays at the edge. A
+        floating wiper's readings jump about while the nose is there.
     """
     since = (time - origin) * 1e-9
+    if loose is None:
+        floats = vane.gap_width_deg > 0.0 and vane.gap_reading_deg == "floating"
+        loose = erratic(Angles(time, reading), LOOSE_STEP) & floats
     usable = np.isfinite(reading)
     for outage in vane.outages:
         usable &= (since < outage.start) | (since >= outage.stop)
-    time, angle = time[usable], reading[usable]
+    time, angle, loose = time[usable], reading[usable], loose[usable]
     half_width = np.zeros(angle.shape[0])
     if vane.reversed:
         angle = -angle
@@ -74,6 +88,9 @@ def headings(vane: Angle, time: TimeArray, reading: FloatArray, origin: int) -> 
         if vane.gap_reading_deg is None:
             inside = np.abs(off) <= 0.5 * width + tolerance
             middle, reach = centre + 0.25 * width * np.sign(off), 0.25 * width
+        elif vane.gap_reading_deg == "floating":
+            inside = loose | (np.abs(off) < 0.5 * width - tolerance)
+            middle, reach = np.full_like(angle, centre), 0.5 * width
         else:
             shown = wrapped(angle - np.radians(vane.gap_reading_deg))
             inside = (np.abs(shown) <= tolerance) | (np.abs(off) < 0.5 * width - tolerance)
@@ -112,19 +129,35 @@ class NoseReader:
             for s in self._timeline.stations
         ]
         self._last: tuple[int, float] | None = None
+        self._floats = any(a.gap_reading_deg == "floating" for a in self._instruments)
+        self._recent = Angles(np.empty(0, dtype=np.int64), np.empty(0))
         self._waiting = Headings(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
 
     def read(self, part: Series, stop: int) -> Headings:
         """Headings before `stop` [ns] from a block's readings, and those that waited for it."""
         found = [self._waiting]
+        loose = self._loose(part)
         for number, here in self._timeline.parts(part.time):
             vane = self._instruments[number]
-            plain = headings(vane, part.time[here], part.value[here, 0], self._origin)
+            plain = headings(vane, part.time[here], part.value[here, 0], self._origin, loose[here])
             found.append(self._unfiltered(plain, vane.filter_time_constant))
         together = Headings(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
         ready = together.time < stop
         self._waiting = together.part(~ready)
         return together.part(ready)
+
+    def _loose(self, part: Series) -> BoolArray:
+        """Readings that jump about, seen together with the last ones before."""
+        if not self._floats:
+            return np.zeros(part.time.size, dtype=np.bool_)
+        known = self._recent.time.size
+        together = Angles(
+            np.concatenate((self._recent.time, part.time)),
+            np.concatenate((self._recent.angle, part.value[:, 0])),
+        )
+        kept = slice(max(known + part.time.size - _RECENT_READINGS, 0), None)
+        self._recent = Angles(together.time[kept], together.angle[kept])
+        return erratic(together, LOOSE_STEP)[known:]
 
     def _unfiltered(self, seen: Headings, constant: float) -> Headings:
         if constant <= 0.0:

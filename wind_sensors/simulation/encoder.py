@@ -126,7 +126,7 @@ class AngleEncoder:
             noise = random_numbers.normal(self._seed, f"{self._name}/noise", numbers)
             angle = angle + np.radians(vane.noise_deg) * noise
         if azimuth and vane.gap_width_deg > 0.0:
-            angle = self._over_gap(vane, angle)
+            angle = self._over_gap(vane, angle, numbers)
         if azimuth and vane.reversed:
             angle = -angle
         if vane.quantisation_deg > 0.0:
@@ -134,13 +134,17 @@ class AngleEncoder:
             angle = np.rint(wrap(angle) / step) * step
         return wrap(angle)
 
-    @staticmethod
-    def _over_gap(vane: Angle, angle: FloatArray) -> FloatArray:
+    def _over_gap(
+        self, vane: Angle, angle: FloatArray, numbers: npt.NDArray[np.int64]
+    ) -> FloatArray:
         half = 0.5 * np.radians(vane.gap_width_deg)
         centre = np.radians(vane.gap_centre_deg)
         into = wrap(angle - centre)
         edge = centre + np.where(into < 0.0, -half, half)
-        if vane.gap_reading_deg is not None:
+        if vane.gap_reading_deg == "floating":
+            chance = random_numbers.uniform(self._seed or 0, f"{self._name}/gap", numbers)
+            edge = 2.0 * np.pi * chance - np.pi
+        elif vane.gap_reading_deg is not None:
             edge = np.full_like(angle, np.radians(vane.gap_reading_deg))
         gapped: FloatArray = np.where(np.abs(into) < half, edge, angle)
         return gapped

@@ -260,8 +260,8 @@ class Angle(Instrument):
     """Middle of the dead gap."""
     gap_width_deg: float = Field(default=0.0, ge=0.0, lt=360.0)
     """Dead gap of a potentiometer; inside it the reading is `gap_reading_deg`."""
-    gap_reading_deg: float | None = None
-    """None: the reading stays at the nearest edge of the gap."""
+    gap_reading_deg: float | Literal["floating"] | None = None
+    """None: the reading stays at the nearest edge of the gap; `floating`: it may be anything."""
     filter_time_constant: NonNegative = 0.0
     """First-order low-pass on the angle [s]."""
     noise_deg: NonNegative = 0.0

@@ -15,6 +15,15 @@ from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+ERRATIC_STEP = np.radians(100.0)
+"""No vane turns this far [rad] between two readings that are `ERRATIC_INTERVAL` apart."""
+
+ERRATIC_INTERVAL = 120_000_000
+"""Readings further apart [ns] are not judged by their steps."""
+
+_ERRATIC_REACH = 150_000_000
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,32 @@ class Angles:
 
     time: TimeArray
     angle: FloatArray
+
+
+def erratic(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
+    """Readings that jump about as an open potentiometer's do, and those close to them; shape (n,).
+
+    A number drawn by chance may lie near the truth, so that readings within 0.15 s of a jump go
+    with it.
+
+    Args:
+        angles: Readings.
+        least: Step between two readings that counts as a jump [rad].
+    """
+    time, angle = angles.time, angles.angle
+    out = np.zeros(time.size, dtype=np.bool_)
+    if time.size < 2:
+        return out
+    step = np.abs(np.angle(np.exp(1j * np.diff(angle))))
+    jump = np.flatnonzero((step > least) & (np.diff(time) <= ERRATIC_INTERVAL))
+    if jump.size == 0:
+        return out
+    at = np.sort(np.concatenate((time[jump], time[jump + 1])))
+    following = np.searchsorted(at, time)
+    before = time - at[np.maximum(following - 1, 0)]
+    after = at[np.minimum(following, at.size - 1)] - time
+    nearest = np.minimum(np.abs(before), np.abs(after))
+    return np.asarray(nearest <= _ERRATIC_REACH, dtype=np.bool_)
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ class Parameter:
         free: Whether what drives the recording lets it be fitted; None: always.
         swing: Smallest change of the air's temperature within the record [K] that the parameter
             needs; with less it keeps its healthy value.
+        fitted: A parameter that is not keeps the value that it starts with (one form of an effect
+            or another).
     """
 
     name: str
@@ -49,6 +51,7 @@ class Parameter:
     wraps: float = 0.0
     swing: float = 0.0
     free: Callable[[Drive], bool] | None = None
+    fitted: bool = True
 
     @property
     def difference(self) -> float:
@@ -80,6 +83,8 @@ class Effect:
         shared: It may concern one instrument or all of them (the logger's clock).
         standing: Share of the smallest size worth reporting at which it is taken to be present on
             any healthy day, whatever healthy recordings say; 0 for what is there or is not.
+        contains: Effects of the same instrument that it can stand in for exactly; the two are
+            never named together.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
             look like that, so a beginning or an end inside the record needs more evidence.
         needs: Data without which it cannot be seen.
@@ -100,6 +105,7 @@ class Effect:
     confusable: Mapping[str, str] = field(default_factory=dict)
     everywhere: bool = False
     shared: bool = False
+    contains: frozenset[str] = frozenset()
     smooths: bool = False
     standing: float = 0.1
     needs: tuple[str, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from typing import Any
 
@@ -97,35 +98,54 @@ EXTRA_PULSES = Effect(
 
 
 _GOLDEN = 0.6180339887
+_NO_PATTERN = 1e-6
 
 
 def _slots(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
     n = entry.pulses_per_revolution
-    # The errors of single slots do not matter here: a pattern without a preferred harmonic.
+    # Beyond the swing once per turn the errors of single slots do not matter here.
     pattern = [math.cos(2.0 * math.pi * (_GOLDEN * k * k + 0.1)) for k in range(n)]
+    waves = [cmath.exp(2j * math.pi * k / n) for k in range(n)]
     middle = sum(pattern) / n
-    size = math.sqrt(sum((p - middle) ** 2 for p in pattern) / n) or 1.0
-    errors = tuple(values["scatter"] * (p - middle) / size for p in pattern)
+    swing = 2.0 * sum((p - middle) * w for p, w in zip(pattern, waves, strict=True)) / n
+    rest = [
+        p - middle - (swing * w.conjugate()).real for p, w in zip(pattern, waves, strict=True)
+    ]
+    size = math.sqrt(sum(r * r for r in rest) / n)
+    scatter = values["scatter"] / size if size > _NO_PATTERN else 0.0
+    errors = tuple(
+        scatter * r + values["once_per_turn"] * w.real for r, w in zip(rest, waves, strict=True)
+    )
     return _electronics(entry, slot_errors=errors)
+
+
+def _slots_size(values: Values) -> float:
+    return math.hypot(values["scatter"], values["once_per_turn"] / math.sqrt(2.0)) / 0.012
 
 
 ENCODER_SLOT_ERROR = Effect(
     name="encoder_slot_error",
-    meaning="The slots of the pulse disc are not evenly spaced.",
+    meaning="The slots of the pulse disc are not evenly spaced, or the disc is off centre.",
     entrance="output",
-    equation="edge of slot k at (k + error_k) 2 pi / n; scatter = rms of the errors",
+    equation="edge of slot k at (k + error_k) 2 pi / n; error_k: rms `scatter`, besides "
+    "once_per_turn cos(2 pi k / n)",
     source="geometry of the disc",
     region="pulse intervals against rotor angle, all speeds alike",
     standing=0.0,
-    parameters=(Parameter("scatter", "1", 0.0, 0.3, minimum=0.012, step=0.004, starts=(0.03,)),),
+    parameters=(
+        Parameter("scatter", "1", 0.0, 0.3, minimum=0.012, step=0.004, starts=(0.03,)),
+        Parameter("once_per_turn", "1", 0.0, 0.5, minimum=0.017, step=0.004, starts=(0.05,)),
+    ),
     applies=lambda entry, station: isinstance(entry, Rotor) and entry.pulses_per_revolution > 2,
     update=_slots,
-    templates=({"scatter": 0.02},),
+    templates=({"scatter": 0.02, "once_per_turn": 0.0}, {"scatter": 0.0, "once_per_turn": 0.02}),
     confusable={
-        "damaged_cup": "turn the rotor by hand: slot errors stay, the torque does not",
+        "damaged_cup": "turn the rotor by hand: slot errors stay, the torque does not; wind from "
+        "other directions",
         "missed_pulses": "pulse intervals against rotor angle",
     },
+    size=_slots_size,
 )
 
 

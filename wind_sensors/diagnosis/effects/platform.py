@@ -116,7 +116,8 @@ LEVER_ARM = Effect(
     source="rigid-body kinematics",
     region="while the carrier rolls, pitches or turns",
     parameters=tuple(
-        Parameter(name, "m", -6.0, 6.0, minimum=0.5, step=0.1) for name in ("dx", "dy", "dz")
+        Parameter(name, "m", -9.0, 9.0, minimum=0.5, step=0.1, starts=(-5.0, -2.0, 2.0, 5.0))
+        for name in ("dx", "dy", "dz")
     ),
     applies=_is_platform,
     update=_lever,
@@ -239,8 +240,8 @@ ROTOR_DOWNWASH = Effect(
     source="Glauert's momentum theory of a rotor in forward flight",
     region="strongest at low airspeed",
     parameters=(
-        Parameter("induced_velocity", "m/s", -5.0, 15.0, minimum=0.3, step=0.1),
-        Parameter("wake_skew", "1", -2.0, 2.0, minimum=0.0, step=0.05),
+        Parameter("induced_velocity", "m/s", 0.0, 15.0, minimum=0.3, step=0.1),
+        Parameter("wake_skew", "1", 0.0, 1.5, minimum=0.0, step=0.05),
     ),
     applies=_is_platform,
     update=_downwash,

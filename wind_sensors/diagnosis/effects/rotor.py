@@ -173,7 +173,7 @@ TORQUE_ASYMMETRY = Effect(
     region="mean speed and skewness in strong turbulence",
     smooths=True,
     parameters=(
-        Parameter("a4", "1", 0.05, 2.5, healthy=1.0, minimum=0.4, step=0.1),
+        Parameter("a4", "1", 0.05, 2.9, healthy=1.0, minimum=0.4, step=0.1, starts=(2.0,)),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor),
     update=_set("a4"),
@@ -196,11 +196,12 @@ DAMAGED_CUP = Effect(
     entrance="response",
     equation="torque += e A^2 cos(psi - alpha); steady rate times gain",
     source="derived: one unequal cup of three",
+    contains=frozenset({"calibration_drift"}),
     region="once per revolution, locked to the wind's direction; a lower calibration",
     standing=0.0,
     parameters=(
         Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.02, step=0.005, starts=(0.05,)),
-        Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.004, starts=(0.97,)),
+        Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.02, starts=(0.97,)),
     ),
     applies=_is_rotor,
     update=_damage,
@@ -230,8 +231,8 @@ ANGULAR_RESPONSE = Effect(
     source="K14, eqs. (83), (84); J80, sec. 3.2",
     region="strong vertical or lateral turbulence",
     parameters=(
-        Parameter("change", "1", -3.0, 3.0, minimum=0.4, step=0.1),
-        Parameter("skewness", "1", -1.0, 1.0, minimum=0.1, step=0.03),
+        Parameter("change", "1", -5.0, 5.0, minimum=0.4, step=0.1),
+        Parameter("skewness", "1", -2.0, 2.0, minimum=0.1, step=0.03),
     ),
     applies=_is_rotor,
     update=_angular,
@@ -258,6 +259,7 @@ ICING = Effect(
     equation="l S = gain * U - U0 and l0 = factor * l0_cal together",
     source="K94, eq. (6)",
     region="near and below 0 deg C; all speeds and high frequencies",
+    contains=frozenset({"calibration_drift", "rotor_inertia"}),
     standing=0.0,
     smooths=True,
     parameters=(

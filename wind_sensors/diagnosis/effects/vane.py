@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Angle, Instrument, Platform, Station
 
 Entry = Instrument | Platform
@@ -112,6 +113,11 @@ def _imbalance(entry: Entry, values: Values) -> dict[str, Any]:
     }
 
 
+def _has_no_attitude(drive: Drive) -> bool:
+    """Whether nothing tells how the mount leans: a carrier reports it."""
+    return drive.motion is None
+
+
 VANE_IMBALANCE = Effect(
     name="vane_imbalance",
     meaning="The vane's centre of mass lies off its axis, so that tilt and acceleration turn it.",
@@ -124,8 +130,8 @@ VANE_IMBALANCE = Effect(
             "imbalance", "1/m", -40.0, 40.0, minimum=0.15, step=0.05,
             starts=(0.5, -0.5, 2.5, -2.5),
         ),
-        Parameter("tilt_x", "deg", -15.0, 15.0, step=0.5),
-        Parameter("tilt_y", "deg", -15.0, 15.0, step=0.5),
+        Parameter("tilt_x", "deg", -15.0, 15.0, step=0.5, free=_has_no_attitude),
+        Parameter("tilt_y", "deg", -15.0, 15.0, step=0.5, free=_has_no_attitude),
     ),
     applies=_is_vane,
     update=_imbalance,
@@ -204,24 +210,34 @@ VANE_ECCENTRICITY = Effect(
 
 
 def _gap(entry: Entry, values: Values) -> dict[str, Any]:
-    return {"gap_centre_deg": values["centre"], "gap_width_deg": values["width"]}
+    return {
+        "gap_centre_deg": values["centre"],
+        "gap_width_deg": values["width"],
+        "gap_reading_deg": (None, values["reading"], "floating")[round(values["form"])],
+    }
 
 
 POTENTIOMETER_GAP = Effect(
     name="potentiometer_gap",
-    meaning="The potentiometer has a dead gap: there the reading stays at the gap's edge.",
+    meaning="The potentiometer has a dead gap: there the reading stays at the gap's edge, falls "
+    "to one value, or floats.",
     entrance="output",
-    equation="reading = nearest edge while |phi - centre| < width/2",
+    equation="reading = nearest edge, one value or any while |phi - centre| < width/2",
     source="construction of a potentiometer",
     region="one narrow sector of headings",
     standing=0.0,
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),
         Parameter("width", "deg", 0.0, 90.0, minimum=4.0, step=1.0, starts=(10.0, 20.0)),
+        Parameter("reading", "deg", -540.0, 540.0, healthy=None, step=2.0, wraps=360.0),
+        Parameter("form", "1", 0.0, 2.0, healthy=None, fitted=False),
     ),
     applies=_is_vane,
     update=_gap,
-    templates=tuple({"centre": float(c), "width": 12.0} for c in range(-180, 180, 10)),
+    templates=tuple(
+        {"centre": float(c), "width": 12.0, "reading": 0.0, "form": 0.0}
+        for c in range(-180, 180, 10)
+    ),
     confusable={"stuck_sensor": "wind from other directions", "vane_friction": "strong wind"},
     needs=("a vane that crosses the gap",),
 )

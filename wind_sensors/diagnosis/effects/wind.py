@@ -45,7 +45,7 @@ WAKE_SHADOW = Effect(
     standing=0.06,
     parameters=(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),
-        Parameter("depth", "1", -0.6, 0.95, minimum=0.05),
+        Parameter("depth", "1", 0.0, 0.95, minimum=0.05),
         Parameter("width", "deg", 3.0, 40.0, healthy=None, step=0.5),
         Parameter("flank", "1", -0.1, 0.3, step=0.01),
     ),
@@ -130,8 +130,8 @@ AXIS_TILT = Effect(
     source="K94, eq. (2); K14, eqs. (83), (84)",
     region="with the vertical wind, opposite for wind from opposite sides",
     parameters=(
-        Parameter("tilt_x", "deg", -30.0, 30.0, minimum=3.0, step=0.5),
-        Parameter("tilt_y", "deg", -30.0, 30.0, minimum=3.0, step=0.5),
+        Parameter("tilt_x", "deg", -45.0, 45.0, minimum=3.0, step=0.5),
+        Parameter("tilt_y", "deg", -45.0, 45.0, minimum=3.0, step=0.5),
     ),
     applies=lambda entry, station: (
         isinstance(entry, Rotor | Angle) and not getattr(entry, "mounted_on", "")

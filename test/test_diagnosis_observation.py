@@ -1,0 +1,131 @@
+"""What is compared: rates at the record's ends, slots and damage, stillness, loose wipers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.comparison import BANDS, prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.observation import Grid, rate_series, stillness_statistics
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.station.model import Cup
+from wind_sensors.station.signals import Angles, Pulses, erratic
+
+SECOND = 1_000_000_000
+
+
+def _readings(angle: np.ndarray) -> Angles:
+    return Angles(np.arange(angle.size, dtype=np.int64) * (SECOND // 20), angle)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.05, 0.9), st.floats(1.0, 9.0))
+def test_a_steady_rotor_turns_evenly_to_both_ends(phase: float, rate: float) -> None:
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    spacing = 1.0 / (rate * cup.pulses_per_revolution)
+    edges = np.arange(phase * spacing, 20.0, spacing)
+    grid = Grid(0, 0.2, 100)
+    found = rate_series(Pulses(np.round(edges * 1e9).astype(np.int64)), cup, grid)
+    expected = 2.0 * np.pi * cup.calibration_distance * rate
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_a_rotor_that_stops_stands() -> None:
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    time = (np.arange(0.0, 5.0, 0.02) * 1e9).astype(np.int64)
+    found = rate_series(Pulses(time), cup, Grid(0, 0.2, 100))
+    assert np.all(found[:24] > 0.0)
+    assert np.all(found[27:] == 0.0)
+
+
+@given(st.floats(-2.0, 2.0), st.floats(0.0, 4.0))
+def test_a_vane_that_turns_is_not_erratic(start: float, rate: float) -> None:
+    turning = start + rate * np.arange(400) / 20.0
+    assert not erratic(_readings(np.angle(np.exp(1j * turning)))).any()
+
+
+def test_a_loose_wiper_is_erratic_and_nothing_else() -> None:
+    rng = np.random.default_rng(5)
+    angle = 0.1 * rng.standard_normal(2000)
+    loose = np.zeros(2000, dtype=bool)
+    loose[400:440] = loose[900:930] = loose[1500] = True
+    angle[loose] = rng.uniform(-np.pi, np.pi, loose.sum())
+    angle[1500] = 2.5
+    found = erratic(_readings(angle))
+    assert np.mean(found[loose]) > 0.95
+    near = np.convolve(loose, np.ones(9), "same") > 0
+    assert not found[~near].any()
+
+
+def test_sparse_readings_are_not_judged_by_their_steps() -> None:
+    time = np.arange(100, dtype=np.int64) * SECOND
+    assert not erratic(Angles(time, np.where(np.arange(100) % 2, 3.0, 0.0))).any()
+
+
+def test_slots_do_not_look_like_a_damaged_cup() -> None:
+    # Statistics: scatter, once per turn, once and twice per turn locked to the wind.
+    def statistics(effect: str, **values: float) -> np.ndarray:
+        station = with_effect(STATION, catalogue()[effect], "cup", values)
+        simulated = prepare(recorded(STATION, 70, swing=0.8)).simulate(station)
+        return simulated.statistics["cup/rotor_rate"][BANDS + 2 :]
+
+    slots = statistics("encoder_slot_error", scatter=0.03, once_per_turn=0.06)
+    damage = statistics("damaged_cup", torque_harmonic=0.2, gain=1.0)
+    assert slots[0] > 0.02 and slots[1] > 0.02
+    assert slots[2] < 0.1 * slots[1]
+    assert damage[0] < 0.1 * damage[2]
+
+
+def test_a_vane_that_creeps_and_jumps_is_stiller_than_one_that_swings() -> None:
+    rng = np.random.default_rng(6)
+    speed = 3.0 + np.sin(np.arange(4000) / 300.0)
+    swinging = 0.2 * rng.standard_normal(4000)
+    sticking = np.repeat(swinging[::4], 4)
+    still = stillness_statistics(sticking, speed)
+    assert np.all(still > stillness_statistics(swinging, speed) + 0.2)
+    # A little noise on a vane that sticks changes little.
+    noisy = stillness_statistics(sticking + 1e-4 * rng.standard_normal(4000), speed)
+    np.testing.assert_allclose(noisy, still, atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("values", "form"),
+    [
+        ({"reading": 0.0, "form": 0.0}, 0.0),
+        ({"reading": 200.0, "form": 1.0}, 1.0),
+        ({"reading": 0.0, "form": 2.0}, 2.0),
+    ],
+)
+def test_every_form_of_a_gap_is_named(values: dict[str, float], form: float) -> None:
+    healthy = recorded(STATION, 67)
+    centre = float(np.degrees(np.angle(np.mean(np.exp(1j * healthy.angles["vane"].angle)))))
+    gap = {"centre": centre, "width": 16.0, **values}
+    station = with_effect(STATION, catalogue()["potentiometer_gap"], "vane", gap)
+    (finding,) = diagnose(recorded(station, 67), baseline(), with_proof=False).findings
+    assert finding.term.key == ("potentiometer_gap", "vane")
+    assert finding.term.values["form"] == form
+    assert finding.parameters["width"].value == pytest.approx(16.0, abs=3.0)
+    off = np.radians(finding.parameters["centre"].value - centre)
+    assert abs(np.degrees(np.angle(np.exp(1j * off)))) < 3.0
+    assert ("reading" in finding.parameters) == (form == 1.0)
+    assert "form" not in finding.parameters
+
+
+def test_what_one_effect_contains_is_not_named_beside_it() -> None:
+    station = with_effect(
+        STATION, catalogue()["damaged_cup"], "cup", {"torque_harmonic": 0.15, "gain": 0.92}
+    )
+    (finding,) = diagnose(
+        recorded(station, 68, swing=0.8), replace(baseline()), with_proof=False
+    ).findings
+    assert finding.term.key == ("damaged_cup", "cup")
+    assert finding.parameters["gain"].value == pytest.approx(0.92, abs=0.02)
