@@ -12,8 +12,9 @@ import time
 from pathlib import Path
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.learning import learn
-from wind_sensors.diagnosis.verdict import Diagnosis, Finding, diagnose
+from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.recordings import read_recording
 
 WORKERS = 2

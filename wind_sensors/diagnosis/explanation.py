@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
 from wind_sensors.diagnosis.search import (
@@ -38,6 +39,9 @@ FURTHER_SHARE = 0.05
 
 LARGEST_INEXACTNESS = 100.0
 """But never more than this."""
+
+MOMENTS = 24
+"""Parts of the record of which three in a row may hold a single event."""
 
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
@@ -186,6 +190,35 @@ def judged(
         Judged(again, searcher.whitener(again.simulated, named), value)
         for again, value in sorted(fits, key=lambda pair: pair[1])
     ]
+
+
+def single_event(searcher: Searcher, before: Fit, after: Fit) -> float:
+    """How much more of a gain the best moment of the record brings than the second best.
+
+    One gust that the reference missed, one swing of a vane can make any effect look better that
+    moves the signals a little; an effect that always holds does so again and again.
+
+    Args:
+        searcher: The search.
+        before, after: Two explanations in the same null.
+    """
+    newest = after.terms[-1]
+    if newest.effect.local or newest.interval != ALWAYS:
+        return 0.0
+    comparison = searcher.comparison
+    n = comparison.coefficients
+    gain = np.zeros(MOMENTS)
+    width = comparison.grid.n // MOMENTS
+    for k in range(len(comparison.channels)):
+        for sign, fitted in ((1.0, before), (-1.0, after)):
+            white = np.zeros(comparison.grid.n)
+            white[:n] = fitted.vector[k * n : (k + 1) * n]
+            squares = spectra.from_cosine(white)[: MOMENTS * width] ** 2
+            gain += sign * squares.reshape(MOMENTS, width).sum(axis=1)
+    around = np.convolve(gain, np.ones(3), "same")
+    best = int(np.argmax(around))
+    elsewhere = np.abs(np.arange(MOMENTS) - best) > 2
+    return float(max(around[best] - max(np.max(around[elsewhere]), 0.0), 0.0))
 
 
 def may_join(further: Term, terms: Sequence[Term]) -> bool:

@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.explanation import (
     no_terms,
     plausible,
     seen_in,
+    single_event,
     total,
 )
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
@@ -99,7 +100,8 @@ def _brings(
 ) -> float:
     """What a candidate gains over the terms before: in its own null and in likelihood, the less.
 
-    In its own null alone a flexible effect gains from the noise that it has fitted away.
+    In its own null alone a flexible effect gains from the noise that it has fitted away. What one
+    event in the record brings does not count.
     """
     if not plausible(candidate.fit) or searcher.is_a_way_of_the_wind(candidate.fit.terms[-1]):
         return -np.inf
@@ -109,7 +111,7 @@ def _brings(
         if fixed
         else no_terms(whitener, searcher)
     )
-    gain = total(before) - total(candidate.fit)
+    gain = total(before) - total(candidate.fit) - single_event(searcher, before, candidate.fit)
     return min(gain, before_evidence - candidate.evidence)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +15,10 @@ from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explanation import ACCEPTED_GAIN, Alternative, Naming
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, planted
+from wind_sensors.diagnosis.findings import Finding, Unexplained, equal_explanations, findings_of
+from wind_sensors.diagnosis.fitting import ALWAYS, planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
-from wind_sensors.diagnosis.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
 from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
@@ -30,18 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 Verdict = Literal["none", "named", "ambiguous", "unknown", "inconclusive"]
 
-EQUAL_LIKELIHOOD = 3.0
-"""Explanations whose log-likelihoods lie closer are reported together."""
-
-EQUAL_SHARE = 0.02
-"""So are those that miss the winner by less than this share of its gain: the simulation is not
-exact enough to tell them apart."""
-
 LEAST_REMOVED = 0.5
 """Share of the excess misfit that held-out blocks must lose to an effect that no region shows."""
-
-LEAST_LIKENESS = 0.6
-"""Cosine between the white corrections of two explanations of the same thing."""
 
 REMAINDER_SCORES = {
     "frequency": 60.0,
@@ -65,67 +55,8 @@ REMAINDER_P = 0.05
 MOST_FREE_PARAMETERS = 2
 """An explanation with more parameters must also stand out somewhere in the data."""
 
-INTERVAL_FACTOR = 1.96
-MISMATCH_FACTOR = 1.25
-"""Intervals are wider than the noise alone would make them, for the simulation is not exact."""
-
-FORM_ERROR = 0.025
-"""Standard error of a size, relative to it, that the simulation's form leaves."""
-
 TOO_BLUNT = 6.0
 """A record that shows no effect below this many smallest sizes is inconclusive."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A fitted parameter with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One named effect.
-
-    Attributes:
-        term: The effect with its values and interval.
-        parameters: With intervals, by name.
-        located: Where the mismatch shows most.
-        share: Share of the whole misfit that the effect removes.
-        p: Probability of the location's score on a healthy day.
-        alternatives: Other effects and how far their log-likelihood lies behind.
-        proof: On held-out blocks; None for a member of an ambiguous set that did not win.
-        set_number: Number of the ambiguous set it belongs to, 0 for none.
-    """
-
-    term: Term
-    parameters: Mapping[str, Estimate]
-    located: Found
-    share: float
-    p: float
-    alternatives: tuple[tuple[str, str, float], ...]
-    proof: Proof | None
-    set_number: int = 0
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """What is left over the baseline.
-
-    Attributes:
-        p: Probability of the largest remainder on a healthy day.
-        share: Its share of the whole misfit.
-        regions: Where it shows most.
-        description: For people.
-    """
-
-    p: float
-    share: float
-    regions: tuple[Found, ...]
-    description: str
 
 
 @dataclass(frozen=True)
@@ -158,57 +89,6 @@ class Diagnosis:
     corrected: Simulated = field(repr=False)
     regions_before: tuple[Found, ...] = ()
     bank: RegionBank | None = field(default=None, repr=False)
-
-
-def _estimates(explanation: Fit) -> list[dict[str, Estimate]]:
-    out = []
-    place = 0
-    for term in explanation.terms:
-        found = {}
-        for parameter in term.effect.parameters:
-            variance = float(explanation.covariance[place, place])
-            # A parameter that the recording does not see has no estimate.
-            value = term.values[parameter.name]
-            departure = 0.0 if parameter.healthy is None else value - parameter.healthy
-            noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
-            error = INTERVAL_FACTOR * float(np.hypot(noise, FORM_ERROR * departure))
-            place += 1
-            if not np.isfinite(error):
-                continue
-            found[parameter.name] = Estimate(
-                value,
-                max(value - error, parameter.low),
-                min(value + error, parameter.high),
-                parameter.unit,
-            )
-        out.append(found)
-    return out
-
-
-def _equal(naming: Naming) -> list[tuple[int, Alternative]]:
-    """Explanations that fit as well with one effect exchanged: its position, the explanation."""
-    own = [t.key for t in naming.fit.terms]
-    share = EQUAL_SHARE if len(own) == 1 else 0.0
-    limit = max(2.0 * EQUAL_LIKELIHOOD, share * naming.gain)
-    seen = set(own)
-    out: list[tuple[int, Alternative]] = []
-    for alternative in naming.alternatives:
-        theirs = [t.key for t in alternative.fit.terms]
-        missing = [k for k, key in enumerate(own) if key not in theirs]
-        if len(theirs) != len(own) or len(missing) != 1 or theirs[-1] in seen:
-            continue
-        if alternative.behind < limit and _alike(naming, alternative):
-            seen.add(theirs[-1])
-            out.append((missing[0], alternative))
-    return out
-
-
-def _alike(naming: Naming, alternative: Alternative) -> bool:
-    """Whether an alternative explains the same part of the data as the winner."""
-    own = naming.nothing - naming.fit.vector
-    other = naming.nothing - alternative.fit.vector
-    cosine = float(own @ other) / max(float(np.linalg.norm(own) * np.linalg.norm(other)), 1e-9)
-    return cosine > LEAST_LIKENESS
 
 
 def _remainder(
@@ -359,7 +239,7 @@ def diagnose(
     after = strongest(naming.adequate, rest, left, naming.fit.simulated)
     remainder = _remainder(naming, rest, comparison)
     detectable = smallest_detectable(searcher, whitener)
-    equal = _equal(naming)
+    equal = equal_explanations(naming)
     located_p = bank.p_value(max(f.score for f in before))
     verdict = _verdict(naming, equal, remainder, detectable, located_p)
     calm = is_too_calm(comparison, baseline) and verdict != "none" and (
@@ -368,7 +248,7 @@ def diagnose(
     if calm:
         verdict = "inconclusive"
     report("proving")(0.2)
-    findings = _findings(naming, equal, before, bank, baseline, with_proof) if verdict in {
+    findings = findings_of(naming, equal, before, bank, baseline, with_proof) if verdict in {
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
@@ -414,158 +294,3 @@ def _borne_out(findings: tuple[Finding, ...]) -> bool:
     proofs = [f.proof for f in findings if f.proof is not None]
     located = any(f.p < REMAINDER_P for f in findings)
     return located or not proofs or proofs[0].excess_removed > LEAST_REMOVED
-
-
-def _findings(
-    naming: Naming,
-    equal: list[tuple[int, Alternative]],
-    before: list[Found],
-    bank: RegionBank,
-    baseline: Baseline,
-    with_proof: bool,
-) -> tuple[Finding, ...]:
-    whitener = naming.whitener
-    estimates = _estimates(naming.fit)
-    behind = tuple(
-        (a.fit.terms[-1].effect.name, a.fit.terms[-1].instrument, 0.5 * a.behind)
-        for a in naming.alternatives
-        if a.fit.terms[-1].key not in {t.key for t in naming.fit.terms}
-    )
-    placebo = naming.alternatives[0].fit.terms if naming.alternatives else ()
-    proof = (
-        prove(whitener, baseline.station, naming.fit.terms, placebo) if with_proof else None
-    )
-    misfit = float(naming.nothing @ naming.nothing)
-    out = []
-    for k, term in enumerate(naming.fit.terms):
-        rest = [t for t in naming.fit.terms if t is not term]
-        if rest:
-            vector = whitener.of_station(planted(baseline.station, rest))
-            gain = float(vector @ vector) - naming.fit.cost
-        else:
-            gain = naming.gain
-        own = _location(naming, bank, before, term)
-        share = gain / max(misfit - 0.95 * naming.nothing.size, gain)
-        out.append(
-            Finding(
-                term, estimates[k], own, float(np.clip(share, 0.0, 1.0)),
-                bank.p_value(own.score), behind, proof,
-                k + 1 if any(position == k for position, _ in equal) else 0,
-            )
-        )  # fmt: skip
-    for position, alternative in equal:
-        term = alternative.fit.terms[-1]
-        rival = out[position]
-        values = _estimates(alternative.fit)[-1]
-        out.append(
-            Finding(
-                term, values, rival.located, rival.share, rival.p,
-                ((rival.term.effect.name, rival.term.instrument, -0.5 * alternative.behind),),
-                None, position + 1,
-            )
-        )  # fmt: skip
-    return tuple(out)
-
-
-def _location(naming: Naming, bank: RegionBank, before: list[Found], term: Term) -> Found:
-    """The strongest region in a channel of the term's instrument."""
-    comparison = naming.whitener.comparison
-    channels = {
-        c.name
-        for c in comparison.channels
-        if c.instrument in comparison.affected(comparison.station, term.instrument)
-    }
-    every = strongest(
-        naming.whitener, bank, naming.nothing,
-        comparison.simulate(comparison.station), len(bank.regions),
-    )  # fmt: skip
-    for found in every:
-        if found.region.channel in channels:
-            return found
-    return before[0]
-
-
-def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The content of `diagnosis.json`."""
-    length = diagnosis.comparison.grid.n * diagnosis.comparison.grid.dt
-    return {
-        "recording": diagnosis.recording,
-        "verdict": diagnosis.verdict,
-        "null_calibrated": diagnosis.calibrated,
-        "findings": [finding_json(f, length) for f in diagnosis.findings],
-        "unexplained": {
-            "p": round(diagnosis.unexplained.p, 4),
-            "share": round(diagnosis.unexplained.share, 4),
-            "description": diagnosis.unexplained.description,
-            "regions": [
-                {
-                    "channel": f.region.channel, "kind": f.region.kind, "label": f.region.label,
-                    "excess": f.excess, "unit": f.unit, "score": f.score,
-                }
-                for f in diagnosis.unexplained.regions
-            ],
-        },
-        "smallest_detectable": {
-            key: {"value": _rounded(value), "unit": unit}
-            for key, (value, unit) in diagnosis.smallest_detectable.items()
-        },
-    }  # fmt: skip
-
-
-def _rounded(value: float) -> float | None:
-    return float(f"{value:.5g}") if np.isfinite(value) else None
-
-
-def finding_json(finding: Finding, length: float) -> dict[str, Any]:
-    term = finding.term
-    begin, end = term.interval
-    region = finding.located.region
-    out: dict[str, Any] = {
-        "effect": term.effect.name,
-        "instrument": term.instrument,
-        "located": {
-            "channel": region.channel.partition("/")[2],
-            "time": [begin, length if end is None else end],
-            "region": {region.kind: [region.low, region.high]},
-            "excess": _rounded(finding.located.excess),
-            "unit": finding.located.unit,
-            "share": _rounded(finding.share),
-            "p": finding.p,
-        },
-        "physics": term.effect.meaning,
-        "equation": term.effect.equation,
-        "source": term.effect.source,
-        "parameters": {
-            key: {
-                "value": _rounded(e.value), "low": _rounded(e.low), "high": _rounded(e.high),
-                "unit": e.unit,
-            }
-            for key, e in finding.parameters.items()
-        },
-        "relative_size": _rounded(term.relative_size),
-        "interval_s": None if term.interval == ALWAYS else [begin, end],
-        "alternatives": [
-            {"effect": name, "instrument": instrument, "log_likelihood_behind": _rounded(behind)}
-            for name, instrument, behind in finding.alternatives[:6]
-        ],
-        "separate_by": {
-            name: term.effect.confusable[name]
-            for name, _, _ in finding.alternatives
-            if name in term.effect.confusable
-        },
-    }  # fmt: skip
-    if finding.set_number:
-        out["set"] = finding.set_number
-    if finding.proof is not None:
-        proof = finding.proof
-        out["proof"] = {
-            "score_before": _rounded(proof.before),
-            "score_after": _rounded(proof.after),
-            "score_floor": _rounded(proof.floor),
-            "excess_removed": _rounded(proof.excess_removed),
-            "interval": [_rounded(proof.low), _rounded(proof.high)],
-            "placebo_removed": (
-                None if proof.placebo_removed is None else _rounded(proof.placebo_removed)
-            ),
-        }
-    return out

@@ -8,8 +8,9 @@ from html import escape
 import numpy as np
 
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.findings import Estimate, Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
-from wind_sensors.diagnosis.verdict import Diagnosis, Estimate, Finding
+from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
 
 STYLE = """

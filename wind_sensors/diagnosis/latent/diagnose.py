@@ -11,6 +11,7 @@ from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
+from wind_sensors.diagnosis.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.fitting import Term, planted
 from wind_sensors.diagnosis.latent.headings import (
     BLOCK,
@@ -27,7 +28,6 @@ from wind_sensors.diagnosis.means.search import Explained, Named, search
 from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
-from wind_sensors.diagnosis.verdict import Estimate, Finding, Unexplained
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording

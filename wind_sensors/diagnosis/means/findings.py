@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import CLIP, Bench, halves, huber
@@ -20,7 +21,6 @@ from wind_sensors.diagnosis.means.silences import COLD, WARM, Ice, Silence
 from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
-from wind_sensors.diagnosis.verdict import Estimate, Finding, Unexplained
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]

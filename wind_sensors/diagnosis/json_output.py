@@ -1,0 +1,98 @@
+"""`diagnosis.json`: a diagnosis as plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wind_sensors.diagnosis.findings import Finding
+from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.verdict import Diagnosis
+
+
+def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The content of `diagnosis.json`."""
+    length = diagnosis.comparison.grid.n * diagnosis.comparison.grid.dt
+    return {
+        "recording": diagnosis.recording,
+        "verdict": diagnosis.verdict,
+        "null_calibrated": diagnosis.calibrated,
+        "findings": [finding_json(f, length) for f in diagnosis.findings],
+        "unexplained": {
+            "p": round(diagnosis.unexplained.p, 4),
+            "share": round(diagnosis.unexplained.share, 4),
+            "description": diagnosis.unexplained.description,
+            "regions": [
+                {
+                    "channel": f.region.channel, "kind": f.region.kind, "label": f.region.label,
+                    "excess": f.excess, "unit": f.unit, "score": f.score,
+                }
+                for f in diagnosis.unexplained.regions
+            ],
+        },
+        "smallest_detectable": {
+            key: {"value": _rounded(value), "unit": unit}
+            for key, (value, unit) in diagnosis.smallest_detectable.items()
+        },
+    }  # fmt: skip
+
+
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.5g}") if np.isfinite(value) else None
+
+
+def finding_json(finding: Finding, length: float) -> dict[str, Any]:
+    """One finding; `length` is the recording's [s]."""
+    term = finding.term
+    begin, end = term.interval
+    region = finding.located.region
+    out: dict[str, Any] = {
+        "effect": term.effect.name,
+        "instrument": term.instrument,
+        "located": {
+            "channel": region.channel.partition("/")[2],
+            "time": [begin, length if end is None else end],
+            "region": {region.kind: [region.low, region.high]},
+            "excess": _rounded(finding.located.excess),
+            "unit": finding.located.unit,
+            "share": _rounded(finding.share),
+            "p": finding.p,
+        },
+        "physics": term.effect.meaning,
+        "equation": term.effect.equation,
+        "source": term.effect.source,
+        "parameters": {
+            key: {
+                "value": _rounded(e.value), "low": _rounded(e.low), "high": _rounded(e.high),
+                "unit": e.unit,
+            }
+            for key, e in finding.parameters.items()
+        },
+        "relative_size": _rounded(term.relative_size),
+        "interval_s": None if term.interval == ALWAYS else [begin, end],
+        "alternatives": [
+            {"effect": name, "instrument": instrument, "log_likelihood_behind": _rounded(behind)}
+            for name, instrument, behind in finding.alternatives[:6]
+        ],
+        "separate_by": {
+            name: term.effect.confusable[name]
+            for name, _, _ in finding.alternatives
+            if name in term.effect.confusable
+        },
+    }  # fmt: skip
+    if finding.set_number:
+        out["set"] = finding.set_number
+    if finding.proof is not None:
+        proof = finding.proof
+        out["proof"] = {
+            "score_before": _rounded(proof.before),
+            "score_after": _rounded(proof.after),
+            "score_floor": _rounded(proof.floor),
+            "excess_removed": _rounded(proof.excess_removed),
+            "interval": [_rounded(proof.low), _rounded(proof.high)],
+            "placebo_removed": (
+                None if proof.placebo_removed is None else _rounded(proof.placebo_removed)
+            ),
+        }
+    return out
