@@ -229,7 +229,10 @@ class Comparison:
                     (
                         self._vane_spectrum(readings, channel),
                         stillness_statistics(
-                            deviation + self.direction, self.speed, self.mask
+                            deviation + self.direction,
+                            self.expected.get(channel.name, deviation) + self.direction,
+                            self.speed,
+                            self.mask,
                         ),
                         erratic_statistics(readings, self.direction, self.grid, self.mask),
                     )

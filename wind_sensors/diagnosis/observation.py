@@ -198,40 +198,41 @@ def erratic_statistics(
     )
 
 
+LEAST_TURNS = 150
+"""Bins with fewer turns say nothing about a vane's stillness."""
+
 STILLNESS = 3
 """Number of statistics of how still a vane stands between its movements."""
 
 
 def stillness_statistics(
-    series: FloatArray, speed: FloatArray, mask: FloatArray | None = None
+    series: FloatArray, usual: FloatArray, speed: FloatArray, mask: FloatArray | None = None
 ) -> FloatArray:
-    """How often a vane hardly moves: the share of small turns, against its large ones.
+    """How often a vane hardly moves, against its large turns on a healthy day.
 
     Args:
         series: Angle in each bin [rad], shape (n,).
+        usual: What a healthy vane would show [rad], shape (n,).
         speed: Slow wind speed at the bins [m/s], shape (n,).
         mask: Weight of the bins; those below a half do not count.
 
     Returns:
-        Shares of turns from bin to bin below 7 and 20 % of what every tenth of them exceeds, in the
-        slowest third of the record; the first of them for the rest.
+        Shares of turns from bin to bin below 7 and 20 % of what every tenth of the usual ones
+        exceeds, in the slowest third of the record; the first of them for the rest.
     """
-    turns = np.abs(np.diff(series))
-    if mask is not None:
-        turns, speed = turns[mask[1:] > 0.5], speed[mask > 0.5]
-        speed = speed[: turns.size]
-        turns = turns[: speed.size]
-    else:
-        speed = speed[1:]
-    if turns.size < 150:
-        return np.zeros(STILLNESS)
-    slow = speed < np.quantile(speed, 0.33)
     out = np.zeros(STILLNESS)
-    if np.count_nonzero(slow) < 50:
+    counted = np.ones(series.size - 1, dtype=np.bool_) if mask is None else mask[1:] > 0.5
+    turns, large = np.abs(np.diff(series))[counted], np.abs(np.diff(usual))[counted]
+    speed = speed[1:][counted]
+    if turns.size < LEAST_TURNS:
         return out
-    large = float(np.quantile(turns[slow], 0.9))
-    out[0], out[1] = np.mean(turns[slow] <= 0.07 * large), np.mean(turns[slow] <= 0.2 * large)
-    out[2] = np.mean(turns[~slow] <= 0.07 * float(np.quantile(turns[~slow], 0.9)))
+    slow = speed < np.quantile(speed, 0.33)
+    if np.count_nonzero(slow) < LEAST_TURNS // 3:
+        return out
+    large_in_calm = float(np.quantile(large[slow], 0.9))
+    out[0] = np.mean(turns[slow] <= 0.07 * large_in_calm)
+    out[1] = np.mean(turns[slow] <= 0.2 * large_in_calm)
+    out[2] = np.mean(turns[~slow] <= 0.07 * float(np.quantile(large[~slow], 0.9)))
     return out
 
 

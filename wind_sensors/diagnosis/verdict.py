@@ -50,6 +50,9 @@ may differ from the simulation's."""
 REMAINDER_SHARE = 0.012
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
+RIVAL_SHARE = 0.3
+"""A smaller remainder with this share of it says as much: it rivals what was named."""
+
 REMAINDER_P = 0.05
 
 MOST_FREE_PARAMETERS = 2
@@ -189,7 +192,8 @@ def _verdict(
     if naming.fit.active > MOST_FREE_PARAMETERS and located_p > REMAINDER_P:
         # Many parameters that no region of the data asks for.
         return "none"
-    if (structured and share > REMAINDER_SHARE) or _patchwork(naming):
+    rivals = p < REMAINDER_P and share > RIVAL_SHARE
+    if (structured and share > REMAINDER_SHARE) or rivals or _patchwork(naming):
         return "unknown"
     return "ambiguous" if equal else "named"
 
