@@ -118,7 +118,9 @@ def swing(
     torque -= tracks.imbalance[i] * (cosine * tracks.gravity_y[i] - sine * tracks.gravity_x[i])
     torque -= tracks.spring[i] * math.sin(nose - tracks.spring_heading[i])
     if geometry.propeller_drag > 0.0:
-        distance = geometry.propeller_distance + tracks.lead[i]
+        # The tunnel measured the vane with its propeller where it is: a drawing that errs does not
+        # change how the vane swings.
+        distance = geometry.propeller_distance
         side = north * cosine - east * sine - rate * distance
         speed = math.sqrt(east * east + north * north)
         torque += 0.5 * density * geometry.propeller_drag * speed * side * distance

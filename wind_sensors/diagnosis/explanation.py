@@ -37,7 +37,7 @@ ACCEPTED_ELSEWHERE_GAIN = 22.0
 FURTHER_SHARE = 0.05
 """A further effect on the same signals must also bring this share of the gain so far."""
 
-LARGEST_INEXACTNESS = 100.0
+LARGEST_INEXACTNESS = 150.0
 """But never more than this."""
 
 MOMENTS = 24

@@ -179,7 +179,9 @@ def _reading_guesses(comparison: Comparison, vane: Angle) -> list[Term]:
     if values.size < 0.25 * readings.size and steps.size > 1:
         step = float(np.median(steps[steps < 1.5 * np.quantile(steps, 0.2) + 1e-9]))
         if np.sum(counts) / values.size > 8.0 and step > 0.3:
-            out.append(_term("quantisation", vane.name, step=step))
+            turns = np.exp(2j * np.pi * values / step)
+            origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
+            out.append(_term("quantisation", vane.name, step=step, origin=origin))
     common = values[counts > max(0.004 * readings.size, 20)]
     hole = _hole(degrees)
     if hole is not None:

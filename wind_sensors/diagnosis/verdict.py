@@ -47,7 +47,7 @@ REMAINDER_SCORES = {
 raise the power of a band on healthy days, too; a named effect leaves less than this where its form
 may differ from the simulation's."""
 
-REMAINDER_SHARE = 0.012
+REMAINDER_SHARE = 0.02
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
 RIVAL_SHARE = 0.3

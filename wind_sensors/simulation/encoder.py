@@ -131,7 +131,8 @@ class AngleEncoder:
             angle = -angle
         if vane.quantisation_deg > 0.0:
             step = np.radians(vane.quantisation_deg)
-            angle = np.rint(wrap(angle) / step) * step
+            origin = np.radians(vane.quantisation_origin_deg)
+            angle = np.rint(wrap(angle - origin) / step) * step + origin
         return wrap(angle)
 
     def _over_gap(

@@ -256,6 +256,8 @@ class Angle(Instrument):
     """Heading at which the eccentricity error passes zero upwards."""
     quantisation_deg: NonNegative = 0.0
     """Step of the encoder."""
+    quantisation_origin_deg: float = 0.0
+    """One of its readings."""
     gap_centre_deg: float = 0.0
     """Middle of the dead gap."""
     gap_width_deg: float = Field(default=0.0, ge=0.0, lt=360.0)

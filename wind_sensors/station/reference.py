@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -79,7 +79,7 @@ def _annotation(annotation: Any) -> str:
         names_of_types = {"str": "text", "float": "number", "int": "whole number", "bool": "yes/no"}
         return names_of_types.get(annotation.__name__, annotation.__name__)
     arguments = [a for a in get_args(annotation) if a is not Ellipsis and a is not type(None)]
-    if "Literal" in str(annotation):
+    if get_origin(annotation) is Literal:
         return ", ".join(f"`{a}`" if a else "empty" for a in arguments)
     if "dict" in str(annotation):
         return "keys with values"

@@ -245,23 +245,24 @@ POTENTIOMETER_GAP = Effect(
 
 
 def _quantisation(entry: Entry, values: Values) -> dict[str, Any]:
-    return {"quantisation_deg": values["step"]}
+    return {"quantisation_deg": values["step"], "quantisation_origin_deg": values["origin"]}
 
 
 QUANTISATION = Effect(
     name="quantisation",
     meaning="The reading comes in steps.",
     entrance="output",
-    equation="reading = step * round(phi / step)",
+    equation="reading = origin + step * round((phi - origin) / step)",
     source="definition",
     region="all, in the histogram of the readings",
     standing=0.0,
     parameters=(
         Parameter("step", "deg", 0.0, 95.0, minimum=2.0, step=0.5, starts=(5.0, 11.25, 22.5)),
+        Parameter("origin", "deg", -360.0, 360.0, healthy=None, fitted=False),
     ),
     applies=_is_vane,
     update=_quantisation,
-    templates=({"step": 5.0}, {"step": 22.5}),
+    templates=({"step": 5.0, "origin": 0.0}, {"step": 22.5, "origin": 0.0}),
     confusable={"vane_friction": "strong wind: friction fades, steps stay"},
 )
 
