@@ -196,14 +196,15 @@ def single_event(searcher: Searcher, before: Fit, after: Fit) -> float:
     """How much more of a gain the best moment of the record brings than the second best.
 
     One gust that the reference missed, one swing of a vane can make any effect look better that
-    moves the signals a little; an effect that always holds does so again and again.
+    delays or damps the signals a little; if it always holds, it does so again and again. What acts
+    in a sector or in a lull may show once.
 
     Args:
         searcher: The search.
         before, after: Two explanations in the same null.
     """
     newest = after.terms[-1]
-    if newest.effect.local or newest.interval != ALWAYS:
+    if not newest.effect.smooths or newest.interval != ALWAYS:
         return 0.0
     comparison = searcher.comparison
     n = comparison.coefficients

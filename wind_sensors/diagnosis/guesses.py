@@ -27,7 +27,15 @@ LEAN = 15.0
 """Lean of the axis [deg] from which its fit begins: what it does to a rotor grows with its square,
 so that a small lean shows no way."""
 
-BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift"})
+LEAST_SWING = 3.0
+"""Change of temperature [K] from which a bearing may be seen to stiffen."""
+
+BRAKES = (0.5, 2.0, 6.0)
+STIFFENINGS = (-0.03, -0.08, -0.16)
+"""Squared friction speeds at the mean temperature [m^2/s^2] and coefficients [1/K] to begin with:
+the two make up for each other, so that a search for one at a time gets lost."""
+
+BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift", "bearing_friction"})
 """Effects that are tried whether or not the screening sees them."""
 
 DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
@@ -65,6 +73,7 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
         if isinstance(entry, Rotor):
             rate = simulated.series[channel.name]
             terms = [
+                *_frictions(comparison, entry),
                 *_pulse_guesses(comparison, station, entry),
                 *_silence(comparison, entry, rate),
             ]
@@ -78,6 +87,23 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
         for term in terms:
             out.setdefault(term.key, []).append(term)
     return out
+
+
+def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
+    """Bearings that brake alike at the record's mean temperature and change with it differently."""
+    temperature = comparison.drive.temperature
+    if temperature is None or float(np.ptp(temperature)) < LEAST_SWING:
+        return []
+    away = float(np.mean(temperature)) - rotor.reference_temperature
+    return [
+        _term(
+            "bearing_friction", rotor.name,
+            friction_speed=float(np.sqrt(brake * np.exp(-coefficient * away))),
+            temperature_coefficient=coefficient,
+        )
+        for brake in BRAKES
+        for coefficient in STIFFENINGS
+    ]  # fmt: skip
 
 
 def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> list[Term]:

@@ -201,6 +201,12 @@ def erratic_statistics(
 LEAST_TURNS = 150
 """Bins with fewer turns say nothing about a vane's stillness."""
 
+LEAST_REACH = 0.3
+"""A vane that moves less than this share of its usual large turns stands."""
+
+STANDSTILL = 0.01
+"""Turns below this share of the usual large ones are none."""
+
 STILLNESS = 3
 """Number of statistics of how still a vane stands between its movements."""
 
@@ -208,7 +214,7 @@ STILLNESS = 3
 def stillness_statistics(
     series: FloatArray, usual: FloatArray, speed: FloatArray, mask: FloatArray | None = None
 ) -> FloatArray:
-    """How often a vane hardly moves, against its large turns on a healthy day.
+    """How small a vane's small turns are against its large ones.
 
     Args:
         series: Angle in each bin [rad], shape (n,).
@@ -217,23 +223,30 @@ def stillness_statistics(
         mask: Weight of the bins; those below a half do not count.
 
     Returns:
-        Shares of turns from bin to bin below 7 and 20 % of what every tenth of the usual ones
-        exceeds, in the slowest third of the record; the first of them for the rest.
+        Logarithms of the 10 and 25 % quantiles of the turns from bin to bin over the 90 % one, in
+        the slowest third of the record; the second for the rest. A vane that stands is compared
+        with the usual turns.
     """
     out = np.zeros(STILLNESS)
     counted = np.ones(series.size - 1, dtype=np.bool_) if mask is None else mask[1:] > 0.5
-    turns, large = np.abs(np.diff(series))[counted], np.abs(np.diff(usual))[counted]
+    turns, expected = np.abs(np.diff(series))[counted], np.abs(np.diff(usual))[counted]
     speed = speed[1:][counted]
     if turns.size < LEAST_TURNS:
         return out
     slow = speed < np.quantile(speed, 0.33)
     if np.count_nonzero(slow) < LEAST_TURNS // 3:
         return out
-    large_in_calm = float(np.quantile(large[slow], 0.9))
-    out[0] = np.mean(turns[slow] <= 0.07 * large_in_calm)
-    out[1] = np.mean(turns[slow] <= 0.2 * large_in_calm)
-    out[2] = np.mean(turns[~slow] <= 0.07 * float(np.quantile(large[~slow], 0.9)))
+    out[:2] = _smallness(turns[slow], expected[slow], (0.1, 0.25))
+    out[2:] = _smallness(turns[~slow], expected[~slow], (0.25,))
     return out
+
+
+def _smallness(turns: FloatArray, usual: FloatArray, shares: tuple[float, ...]) -> FloatArray:
+    """Logarithms of quantiles over the 90 % one; neither is less than a part of the usual one."""
+    large = float(np.quantile(usual, 0.9)) + 1e-9
+    reach = max(float(np.quantile(turns, 0.9)), LEAST_REACH * large)
+    small = np.quantile(turns, shares) + STANDSTILL * large
+    return np.asarray(np.log(small / reach), dtype=np.float64)
 
 
 def interval_statistics(

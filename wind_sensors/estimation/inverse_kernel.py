@@ -151,10 +151,10 @@ def forcing_from_motion(
         density_ratio: Air density relative to the calibration's.
         temperature: [deg C].
     """
-    friction = p.friction * (
-        1.0 + p.friction_temperature_coefficient * (temperature - p.reference_temperature)
+    friction = p.friction * math.exp(
+        p.friction_temperature_coefficient * (temperature - p.reference_temperature)
     )
-    push = (p.distance_constant * p.inertia_factor * y_rate + max(friction, 0.0)) / density_ratio
+    push = (p.distance_constant * p.inertia_factor * y_rate + friction) / density_ratio
     if p.form == PROPELLER_JACKSON:
         f = max(table_at(p.angular_response, angle), 0.2)
         g = max(torque_slope_ratio(angle), 0.2)

@@ -168,7 +168,7 @@ class Rotor(Instrument):
     friction_speed: NonNegative = 0.0
     """U_s [m/s]: friction beyond the calibration's, as the speed whose torque it balances."""
     friction_temperature_coefficient: float = 0.0
-    """Relative change of the friction per kelvin; negative when cold stiffens the bearing."""
+    """c [1/K]: the friction goes with exp(c (T - T0)), as a grease's viscosity does; negative."""
     reference_temperature: float = 15.0
     """[deg C]"""
     inertia_factor: Positive = 1.0

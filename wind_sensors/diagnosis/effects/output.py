@@ -162,7 +162,6 @@ STUCK_SENSOR = Effect(
     equation="reading(t) = reading(start) for start < t < stop",
     source="definition",
     region="one interval of time",
-    local=True,
     standing=0.0,
     parameters=(
         Parameter("start", "s", -1.0, 1e6, healthy=None, step=1.0),

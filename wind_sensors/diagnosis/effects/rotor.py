@@ -84,7 +84,7 @@ BEARING_FRICTION = Effect(
     name="bearing_friction",
     meaning="The bearing brakes the rotor with a torque that does not depend on the wind.",
     entrance="response",
-    equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 (1 + c (T - T0)); "
+    equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 exp(c (T - T0)); "
     "steady y = U - U_s^2/U",
     source="J80, eqs. (5), (6)",
     region="low speeds; the rotor stalls below U_s",
@@ -93,8 +93,8 @@ BEARING_FRICTION = Effect(
             "friction_speed", "m/s", 0.0, 6.0, minimum=0.3, step=0.1, starts=(0.5, 1.0, 2.0)
         ),
         Parameter(
-            "temperature_coefficient", "1/K", -1.0, 0.05, step=0.01, swing=3.0,
-            starts=(-0.05, -0.15),
+            "temperature_coefficient", "1/K", -0.4, 0.05, step=0.005, swing=3.0,
+            starts=(-0.05, -0.12),
         ),
     ),
     applies=_is_rotor,

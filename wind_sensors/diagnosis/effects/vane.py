@@ -225,7 +225,6 @@ POTENTIOMETER_GAP = Effect(
     equation="reading = nearest edge, one value or any while |phi - centre| < width/2",
     source="construction of a potentiometer",
     region="one narrow sector of headings",
-    local=True,
     standing=0.0,
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),

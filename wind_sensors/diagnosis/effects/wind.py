@@ -42,7 +42,6 @@ WAKE_SHADOW = Effect(
     "x = (D - D0) / width",
     source="Gaussian wake profile; IEC 61400-12-1, annex on mast influence",
     region="a sector of wind directions, all speeds",
-    local=True,
     standing=0.06,
     parameters=(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),

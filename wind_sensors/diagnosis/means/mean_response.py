@@ -45,7 +45,7 @@ def _indicated(
     height = max(station.recording.measuring_height + rotor.position[2], 2.0)
     ratio = np.where(np.isfinite(density), density / rotor.reference_density, 1.0)
     kelvin = np.where(np.isfinite(temperature), temperature - p.reference_temperature, 0.0)
-    friction = p.friction * (1.0 + p.friction_temperature_coefficient * kelvin)
+    friction = p.friction * np.exp(p.friction_temperature_coefficient * kelvin)
     length = p.distance_constant * p.inertia_factor / float(np.median(ratio))
     # The calibration holds for a rotor with a4 = 1 and a cosine response in this turbulence: only
     # what departs from it is added.

@@ -65,7 +65,7 @@ class RotorParameters(NamedTuple):
     friction: float
     """Bearing friction U_s^2 [m^2/s^2] at the reference temperature."""
     friction_temperature_coefficient: float
-    """Relative change of the friction per kelvin [1/K]."""
+    """c: the friction goes with exp(c (T - T0)) [1/K]."""
     reference_temperature: float
     """Temperature at which `friction` holds [deg C]."""
     inertia_factor: float
@@ -175,10 +175,9 @@ def rotor_acceleration(
             * math.cos(psi - lateral_angle - p.torque_harmonic_phase)
         )
     torque *= density_ratio
-    friction = p.friction * (
-        1.0 + p.friction_temperature_coefficient * (temperature - p.reference_temperature)
+    friction = p.friction * math.exp(
+        p.friction_temperature_coefficient * (temperature - p.reference_temperature)
     )
-    friction = max(friction, 0.0)
     if y > 0.0:
         torque -= friction
     elif y < 0.0:
