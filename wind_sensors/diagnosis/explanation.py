@@ -41,7 +41,10 @@ LARGEST_INEXACTNESS = 150.0
 """But never more than this."""
 
 MOMENTS = 24
-"""Parts of the record of which three in a row may hold a single event."""
+"""Parts of the record."""
+
+EVENT = 3
+"""So many in a row may hold a single event; one, of an effect that passes anyway."""
 
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
@@ -196,15 +199,16 @@ def single_event(searcher: Searcher, before: Fit, after: Fit) -> float:
     """How much more of a gain the best moment of the record brings than the second best.
 
     One gust that the reference missed, one swing of a vane can make any effect look better that
-    delays or damps the signals a little; if it always holds, it does so again and again. What acts
-    in a sector or in a lull may show once.
+    moves the signals a little; if it always holds, it does so again and again. What acts in a
+    sector or in a lull may show once.
 
     Args:
         searcher: The search.
         before, after: Two explanations in the same null.
     """
     newest = after.terms[-1]
-    if not newest.effect.smooths or newest.interval != ALWAYS:
+    passing = newest.interval != ALWAYS
+    if newest.effect.occasional and not passing:
         return 0.0
     comparison = searcher.comparison
     n = comparison.coefficients
@@ -216,9 +220,10 @@ def single_event(searcher: Searcher, before: Fit, after: Fit) -> float:
             white[:n] = fitted.vector[k * n : (k + 1) * n]
             squares = spectra.from_cosine(white)[: MOMENTS * width] ** 2
             gain += sign * squares.reshape(MOMENTS, width).sum(axis=1)
-    around = np.convolve(gain, np.ones(3), "same")
+    together = 1 if passing else EVENT
+    around = np.convolve(gain, np.ones(together), "same")
     best = int(np.argmax(around))
-    elsewhere = np.abs(np.arange(MOMENTS) - best) > 2
+    elsewhere = np.abs(np.arange(MOMENTS) - best) >= together
     return float(max(around[best] - max(np.max(around[elsewhere]), 0.0), 0.0))
 
 

@@ -12,7 +12,7 @@ from wind_sensors.diagnosis.effects.platform import log_is_dead
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.station.model import Angle, Rotor, Station
-from wind_sensors.station.signals import erratic
+from wind_sensors.station.signals import BoolArray, erratic
 
 FloatArray = npt.NDArray[np.float64]
 Guesses = dict[tuple[str, str], list[Term]]
@@ -81,7 +81,7 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
             assert isinstance(entry, Angle)
             terms = [
                 *_floating(comparison, channel),
-                *_reading_guesses(comparison, entry),
+                *_reading_guesses(comparison, channel),
                 *_repeats(comparison, entry),
             ]
         for term in terms:
@@ -167,7 +167,12 @@ def _silence(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Ter
     if inside.size == 0 or np.median(inside) < _RATE_THAT_TURNS:
         return []
     since = comparison.drive.elapsed
-    return [_term("stuck_sensor", rotor.name, start=begin + since, stop=end + since)]
+    return [
+        _term(
+            "stuck_sensor", rotor.name,
+            start=begin + since, stop=end + since, reading=0.0, known=0.0,
+        )
+    ]  # fmt: skip
 
 
 def _repeats(comparison: Comparison, vane: Angle) -> list[Term]:
@@ -188,13 +193,15 @@ def _repeats(comparison: Comparison, vane: Angle) -> list[Term]:
         _term(
             "stuck_sensor", vane.name,
             start=float(time[starts[longest]]) + since, stop=float(time[stops[longest]]) + since,
+            reading=float(np.degrees(readings.angle[starts[longest]])), known=1.0,
         )
     ]  # fmt: skip
 
 
-def _reading_guesses(comparison: Comparison, vane: Angle) -> list[Term]:
-    readings = comparison.recording.angles[vane.name].angle
-    readings = readings[np.isfinite(readings)]
+def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
+    vane = channel.instrument
+    delivered = comparison.recording.angles[vane].angle
+    readings = delivered[np.isfinite(delivered)]
     if readings.size < 200:
         return []
     out = []
@@ -207,26 +214,26 @@ def _reading_guesses(comparison: Comparison, vane: Angle) -> list[Term]:
         if np.sum(counts) / values.size > 8.0 and step > 0.3:
             turns = np.exp(2j * np.pi * values / step)
             origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
-            out.append(_term("quantisation", vane.name, step=step, origin=origin))
+            out.append(_term("quantisation", vane, step=step, origin=origin))
     common = values[counts > max(0.004 * readings.size, 20)]
     hole = _hole(degrees)
     if hole is not None:
-        out.append(_gap(vane.name, *hole))
+        out.append(_gap(vane, *hole))
     if 1 <= common.size <= 3:
         low, high = float(common.min()), float(common.max())
         if common.size == 1:
             beside = [(low + 5.0 * side, 10.0) for side in (-1.0, 1.0)]
-            if hole is None:
-                out.extend(_gap(vane.name, *sector) for sector in beside)
-            sectors = beside if hole is None else [hole]
-            out.extend(_gap(vane.name, *sector, 1, low) for sector in sectors)
+            there = np.abs(np.degrees(delivered) - low) < 1e-3
+            sectors = [_sector(comparison, channel, there), *([hole] if hole else beside)]
+            out.extend(_gap(vane, *sector, 1, low) for sector in sectors)
+            out.extend(_gap(vane, *sector) for sector in sectors)
         else:
             width = high - low
             centre = 0.5 * (low + high)
             if width > 180.0:
                 width, centre = 360.0 - width, centre + 180.0
             if width < 90.0:
-                out.append(_gap(vane.name, centre, width))
+                out.append(_gap(vane, centre, width))
     return out
 
 
@@ -240,19 +247,21 @@ def _gap(
 
 def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     """A gap where readings jump about, in the sector in which they do."""
-    angles = comparison.recording.angles[channel.instrument]
-    wrong = erratic(angles)
+    wrong = erratic(comparison.recording.angles[channel.instrument])
     if np.mean(wrong) < LEAST_ERRATIC:
         return []
+    return [_gap(channel.instrument, *_sector(comparison, channel, wrong), 2)]
+
+
+def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple[float, float]:
+    """Centre and width of the sector in which the nose should be at some readings [deg]."""
+    time = comparison.recording.angles[channel.instrument].time[where]
     heading = comparison.direction + comparison.expected.get(channel.name, 0.0)
-    at = np.interp(
-        comparison.grid.seconds(angles.time[wrong]), comparison.grid.centres, heading
-    )
+    at = np.interp(comparison.grid.seconds(time), comparison.grid.centres, heading)
     centre = float(np.angle(np.mean(np.exp(1j * at))))
     away = np.angle(np.exp(1j * (at - centre)))
     low, middle, high = np.degrees(np.quantile(away, (0.1, 0.5, 0.9)))
-    width = float(np.clip(high - low, 3.0, 90.0))
-    return [_gap(channel.instrument, np.degrees(centre) + middle, width, 2)]
+    return float(np.degrees(centre) + middle), float(np.clip(high - low, 3.0, 90.0))
 
 
 def _hole(degrees: FloatArray) -> tuple[float, float] | None:

@@ -51,8 +51,8 @@ SINGLE_LAG = 0.25
 CANDIDATE_ITERATIONS = 4
 """Gauss-Newton steps of a candidate's fit; the best few are fitted to the end."""
 
-TRIED_STARTS = 3
-CLOSE_START = 0.1
+TRIED_STARTS = 2
+CLOSE_START = 0.05
 """A second starting point is tried if its deviance lies within this share of the number of data
 of the best one's."""
 

@@ -160,6 +160,10 @@ class AngleEncoder:
             good = np.where(stuck, -1, np.arange(readings.shape[0]))
             latest = np.maximum.accumulate(good)
             readings = np.where(latest >= 0, readings[np.maximum(latest, 0)], before)
+            for outage in vane.outages:
+                if outage.reading_deg is not None:
+                    inside = (since >= outage.start) & (since < outage.stop)
+                    readings[inside] = wrap(np.array(np.radians(outage.reading_deg)))
         if readings.shape[0]:
             self._held = float(readings[-1])
         return readings

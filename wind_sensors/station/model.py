@@ -121,6 +121,8 @@ class Outage(Entry):
     """Seconds since the start of the recording."""
     stop: float
     """Seconds since the start of the recording."""
+    reading_deg: float | None = None
+    """What a vane repeats; None: the last reading before."""
 
 
 class Instrument(Entry):

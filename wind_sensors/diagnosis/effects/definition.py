@@ -85,6 +85,8 @@ class Effect:
             any healthy day, whatever healthy recordings say; 0 for what is there or is not.
         contains: Effects of the same instrument that it can stand in for exactly; the two are
             never named together.
+        occasional: It acts in one sector, one lull or one part of the record; others show again
+            and again.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
             look like that, so a beginning or an end inside the record needs more evidence.
         needs: Data without which it cannot be seen.
@@ -106,6 +108,7 @@ class Effect:
     everywhere: bool = False
     shared: bool = False
     contains: frozenset[str] = frozenset()
+    occasional: bool = False
     smooths: bool = False
     standing: float = 0.1
     needs: tuple[str, ...] = ()

@@ -151,7 +151,12 @@ ENCODER_SLOT_ERROR = Effect(
 
 def _outage(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Instrument)
-    outage = Outage.model_construct(start=values["start"], stop=values["stop"])
+    known = values.get("known", 0.0) > 0.5
+    outage = Outage.model_construct(
+        start=values["start"],
+        stop=values["stop"],
+        reading_deg=values["reading"] if known else None,
+    )
     return {"outages": (*entry.outages, outage)}
 
 
@@ -159,13 +164,16 @@ STUCK_SENSOR = Effect(
     name="stuck_sensor",
     meaning="The sensor repeats its last value, or falls silent, for a while.",
     entrance="output",
-    equation="reading(t) = reading(start) for start < t < stop",
+    equation="reading(t) = const for start < t < stop",
     source="definition",
     region="one interval of time",
     standing=0.0,
+    occasional=True,
     parameters=(
         Parameter("start", "s", -1.0, 1e6, healthy=None, step=1.0),
         Parameter("stop", "s", 0.0, 1e6, healthy=None, step=1.0),
+        Parameter("reading", "deg", -540.0, 540.0, healthy=None, fitted=False),
+        Parameter("known", "1", 0.0, 1.0, healthy=None, fitted=False),
     ),
     applies=_is_sensor,
     update=_outage,

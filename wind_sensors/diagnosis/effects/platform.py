@@ -239,6 +239,7 @@ ROTOR_DOWNWASH = Effect(
     equation="w' = w - v_i; u' = u + skew * v_i / |v_h| * u; v_i sqrt(u^2 + v_i^2) = v_h^2",
     source="Glauert's momentum theory of a rotor in forward flight",
     region="strongest at low airspeed",
+    occasional=True,
     parameters=(
         Parameter("induced_velocity", "m/s", 0.0, 15.0, minimum=0.3, step=0.1),
         Parameter("wake_skew", "1", 0.0, 1.5, minimum=0.0, step=0.05),

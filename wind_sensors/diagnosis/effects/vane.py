@@ -125,6 +125,7 @@ VANE_IMBALANCE = Effect(
     equation="phi'' += b (-g_x sin(phi) + g_y cos(phi))",
     source="derived: pendulum term of a vane on a leaning axis",
     region="low speeds, on a mount that leans or accelerates",
+    occasional=True,
     parameters=(
         Parameter(
             "imbalance", "1/m", -40.0, 40.0, minimum=0.15, step=0.05,
@@ -226,6 +227,7 @@ POTENTIOMETER_GAP = Effect(
     source="construction of a potentiometer",
     region="one narrow sector of headings",
     standing=0.0,
+    occasional=True,
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),
         Parameter("width", "deg", 0.0, 90.0, minimum=4.0, step=1.0, starts=(10.0, 20.0)),

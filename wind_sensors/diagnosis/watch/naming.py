@@ -109,7 +109,9 @@ def shortlist(registry: Registry, evidence: Sequence[Evidence]) -> list[Score]:
 
 
 def _free(effect: Effect, values: Mapping[str, float]) -> int:
-    return sum(p.healthy is None or values[p.name] != p.healthy for p in effect.parameters)
+    return sum(
+        p.fitted and (p.healthy is None or values[p.name] != p.healthy) for p in effect.parameters
+    )
 
 
 def _scaled(effect: Effect, values: Mapping[str, float], factor: float) -> dict[str, float]:
