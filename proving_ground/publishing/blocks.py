@@ -68,7 +68,7 @@ def blocks(folder: Path) -> dict[str, str]:
 
 
 def cards_of(folder: Path) -> list[tuple[str, Card]]:
-    """Version and card of every set that was scored, the newest last."""
+    """Version and card of every set that was scored, in their order, the newest last."""
     files = sorted((folder / EARLIER).glob("*.json"))
     files += [p for p in [folder / SCORE] if p.is_file()]
     cards = [(path, read_card(path)) for path in files]

@@ -70,7 +70,8 @@ def _keep_earlier(before: Path, now: Path) -> None:
     if old.get("commitment") != new.get("commitment"):
         kept = before.parent / EARLIER
         kept.mkdir(exist_ok=True)
-        shutil.copyfile(before, kept / f"{old.get('version', 'unnamed')}.json")
+        number = len(list(kept.glob("*.json"))) + 1
+        shutil.copyfile(before, kept / f"{number:02d}_{old.get('version', 'unnamed')}.json")
 
 
 def _draw(folder: Path, figures: Path) -> list[Path]:
