@@ -145,7 +145,9 @@ class SumsJudge:
             self._test.add(number, departure, precision)
             self._evidence.append(evidence)
             self._whole.append(Snapshot(number, comparison, trust, standing, bank.without))
-        if not odd and (learning or self._test.largest < _LEARN_BELOW):
+        # The first blocks of a change are not yet an alarm, and not normal any more.
+        quiet = self._test.largest < _LEARN_BELOW and not self._test.leapt
+        if not odd and (learning or quiet):
             self._normal.learn(comparison, bank.without, residual)
             self._usual.learn(evidence.channels)
         if not odd:

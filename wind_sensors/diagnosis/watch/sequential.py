@@ -53,6 +53,7 @@ class SequentialTest:
             sizes, shape (k,).
         settled, settled_weight: Sums for the amplitudes with which this session began, shape (k,).
         last: Amplitudes of the block before, nan where unseen, shape (k,).
+        leapt: Whether the newest block added as much to a sum as one block may.
     """
 
     false_alarms_per_day: float
@@ -67,6 +68,7 @@ class SequentialTest:
     settled: FloatArray = field(default_factory=lambda: np.zeros(0))
     settled_weight: FloatArray = field(default_factory=lambda: np.zeros(0))
     last: FloatArray = field(default_factory=lambda: np.zeros(0))
+    leapt: bool = False
 
     @property
     def threshold(self) -> float:
@@ -111,12 +113,14 @@ class SequentialTest:
         beyond = departure - np.clip(usual, -largest, largest)
         variance = 1.0 / np.maximum(precision, 1e-9) + self.wander / self.wander_weight
         variance = np.maximum(variance, (SHIFT / _FINEST) ** 2)
+        self.leapt = False
         for sums, since, sign in (
             (self.up, self.since_up, 1.0),
             (self.down, self.since_down, -1.0),
         ):
             step = SHIFT * (sign * beyond - 0.5 * SHIFT) / variance
             step = np.where(precision > 0.0, np.minimum(step, LARGEST_STEP), 0.0)
+            self.leapt = self.leapt or bool(np.any(step >= LARGEST_STEP))
             # The ceiling lets a sum come down within a few blocks when the change is over.
             sums[:] = np.clip(sums + step, 0.0, self.threshold + 3.0 * LARGEST_STEP)
             since[sums == 0.0] = block
