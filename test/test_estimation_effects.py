@@ -77,7 +77,7 @@ def test_slot_errors_are_learnt_without_being_told() -> None:
     recording = blown(mast({"electronics": {"slot_errors": list(planted)}}), duration=120.0)
     estimator = make_estimator(mast(), WINDOW)
     feed(estimator, messages(recording))
-    learnt = estimator._core.filter.slot_error[0, :4]  # type: ignore[union-attr]
+    learnt = estimator._core.filter.slot_error[0, :4]
     # The filter does not know which slot came first.
     turned = [np.roll(planted - planted.mean(), k) for k in range(4)]
     assert min(np.abs(learnt - t).max() for t in turned) < 0.02

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="module")
-def wiener_limit():  # type: ignore[no-untyped-def]
+def wiener_limit():
     sys.path.insert(0, str(ROOT / "benchmarks"))
     try:
         import wiener_limit as module
@@ -23,7 +23,7 @@ def wiener_limit():  # type: ignore[no-untyped-def]
 
 
 @pytest.mark.parametrize("quarter", ["1245", "1300"])
-def test_the_estimate_is_within_a_tenth_of_the_best_linear_one(wiener_limit, quarter: str) -> None:  # type: ignore[no-untyped-def]
+def test_the_estimate_is_within_a_tenth_of_the_best_linear_one(wiener_limit, quarter: str) -> None:
     folder = SHARED / wiener_limit.SONIC_FOLDER
     files = sorted(folder.glob(f"*_{quarter}.dat.gz"))
     if not files:
@@ -34,7 +34,7 @@ def test_the_estimate_is_within_a_tenth_of_the_best_linear_one(wiener_limit, qua
         assert found < 0.5 * naive
 
 
-def test_the_linear_limit_is_met_by_a_signal_that_is_filtered_noise(wiener_limit) -> None:  # type: ignore[no-untyped-def]
+def test_the_linear_limit_is_met_by_a_signal_that_is_filtered_noise(wiener_limit) -> None:
     """A white signal sampled without noise at half its grid: half of its variance is lost."""
     n = 4096
     white = np.ones(n // 2 + 1)

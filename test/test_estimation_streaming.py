@@ -23,7 +23,7 @@ def recording() -> Recording:
     return blown(mast(), duration=50.0)
 
 
-def run(stream: list, settings: EstimatorSettings = SETTINGS):  # type: ignore[type-arg, no-untyped-def]
+def run(stream: list, settings: EstimatorSettings = SETTINGS):
     estimator = make_estimator(mast(), settings)
     feed(estimator, stream)
     estimator.flush()
@@ -34,13 +34,13 @@ def same(a: Estimates, b: Estimates) -> bool:
     return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
 
 
-def delayed(stream: list, longest: float, seed: int) -> list:  # type: ignore[type-arg]
+def delayed(stream: list, longest: float, seed: int) -> list:
     """The stream in the order of arrival when every message is late by up to `longest` seconds."""
     chance = random.Random(seed)
     return sorted(stream, key=lambda m: m[2] + chance.random() * longest * 1e9)
 
 
-def item(estimator, name: str):  # type: ignore[no-untyped-def]
+def item(estimator, name: str):
     return next(i for i in estimator.health() if i.name == name)
 
 
@@ -48,7 +48,7 @@ def item(estimator, name: str):  # type: ignore[no-untyped-def]
 def test_order_of_arrival_and_doubles_do_not_change_a_bit(
     recording: Recording, method: str
 ) -> None:
-    settings = EstimatorSettings(method=method, window=20.0)  # type: ignore[arg-type]
+    settings = EstimatorSettings(method=method, window=20.0)
     stream = messages(recording)
     _, straight = run(stream, settings)
     mixed = delayed(stream + stream[100:400], 0.15, 5)
@@ -88,7 +88,7 @@ def test_memory_does_not_grow_with_the_record() -> None:
         shift = part * 40_000_000_000
         feed(estimator, [(k, n, t + shift, v) for k, n, t, v in messages(piece)])
         estimator.take_estimates()
-        ring = estimator._core._ring  # type: ignore[union-attr]
+        ring = estimator._core._ring
         waiting = sum(len(r.times) for r in estimator._intake.records.values())
         sizes.append((ring.time.size, waiting < 400))
     assert sizes[1] == sizes[2]

@@ -97,7 +97,7 @@ def test_direction_variance_is_corrected_towards_the_truth() -> None:
     )
 
 
-CUP = rotor_parameters(mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0])  # type: ignore[arg-type]
+CUP = rotor_parameters(mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0])
 PROPELLER = rotor_parameters(
     Propeller.model_validate(
         {
@@ -156,7 +156,7 @@ def test_the_inverse_method_lies_between_naive_and_kalman() -> None:
     rms = {}
     for method, bandwidth in (("kalman", 1.0), ("inverse", 1.0), ("inverse", 3.0), ("naive", 1.0)):
         found = process(
-            recording, EstimatorSettings(method=method, bandwidth=bandwidth, window=90.0)  # type: ignore[arg-type]
+            recording, EstimatorSettings(method=method, bandwidth=bandwidth, window=90.0)
         )
         inner = (found.time > recording.start + 20e9) & (found.time < recording.stop - 5e9)
         error = (found.velocity - truth_at(recording, found.time))[inner, :2]

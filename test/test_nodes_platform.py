@@ -56,8 +56,8 @@ def tf2(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     module = ModuleType("tf2_ros")
     module.__spec__ = ModuleSpec("tf2_ros", None)
-    module.Buffer, module.TransformListener = Buffer, Listener  # type: ignore[attr-defined]
-    module.TransformException = Unknown  # type: ignore[attr-defined]
+    module.Buffer, module.TransformListener = Buffer, Listener
+    module.TransformException = Unknown
     monkeypatch.setitem(sys.modules, "tf2_ros", module)
     return state
 
