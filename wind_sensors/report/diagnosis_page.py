@@ -80,13 +80,14 @@ def _summary(diagnosis: Diagnosis) -> str:
     for finding in diagnosis.findings:
         term = finding.term
         text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
-        when = "all the time"
+        # An effect whose sizes are its beginning and end has said when.
+        when = "" if "start" in term.values else "; all the time"
         if term.interval != ALWAYS:
             begin, end = term.interval
-            when = f"from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
+            when = f"; from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
         lines.append(
             f"<p><b>{escape(words(term.effect.name))}</b>, {escape(term.instrument)}: "
-            f"{escape(term.effect.meaning)}<br>{escape(text)}; {when}.</p>"
+            f"{escape(term.effect.meaning)}<br>{escape(text)}{when}.</p>"
         )
     if diagnosis.verdict == "unknown":
         lines.append(f"<p>{escape(diagnosis.unexplained.description)}</p>")
