@@ -15,6 +15,10 @@ from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
 
+CALIBRATED_FROM = 4.0
+"""Slowest wind of a calibration [m/s] (IEC 61400-12-1). Below it the straight line through the
+calibration is continued to the starting speed, near which it cannot hold."""
+
 FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 """Frequencies at which a baseline keeps its curves [Hz]."""
 
@@ -74,6 +78,8 @@ class Baseline:
         standing: Scatter of each template's amplitude between them.
         loudest_gain: Largest drop of the cost, beyond its parameters, that an effect promises in
             one healthy recording judged by the others.
+        slowest_wind: Down to this wind speed [m/s] healthy recordings or certificates say what is
+            normal.
     """
 
     recordings: tuple[str, ...]
@@ -83,6 +89,7 @@ class Baseline:
     means: Mapping[str, float] = field(default_factory=dict)
     standing: Mapping[str, float] = field(default_factory=dict)
     loudest_gain: float = 0.0
+    slowest_wind: float = CALIBRATED_FROM
 
     @property
     def calibrated(self) -> bool:
@@ -124,6 +131,7 @@ class Baseline:
             "means": dict(self.means),
             "standing": dict(self.standing),
             "loudest_gain": self.loudest_gain,
+            "slowest_wind": self.slowest_wind,
         }
         return json.dumps(content, indent=1)
 
@@ -147,6 +155,7 @@ class Baseline:
                 means=content["means"],
                 standing=content["standing"],
                 loudest_gain=content["loudest_gain"],
+                slowest_wind=content["slowest_wind"],
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem

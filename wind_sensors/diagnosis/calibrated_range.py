@@ -1,4 +1,4 @@
-"""Whether a record lies where certificates say what is normal."""
+"""Whether a record lies where it is known what is normal."""
 
 from __future__ import annotations
 
@@ -10,28 +10,24 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.fitting import Term
 
-CALIBRATED_FROM = 4.0
-"""Slowest wind of a calibration [m/s] (IEC 61400-12-1). Below it the straight line through the
-calibration is continued to the starting speed, near which it cannot hold."""
-
-FEWEST_CALIBRATED = 0.25
-"""Share of a record that must lie above."""
-
-TOO_CALM = (
-    f"the wind is below {CALIBRATED_FROM:g} m/s nearly all the time, where calibrations do not "
-    "reach, and no healthy recording shows what is normal there"
-)
+FEWEST_KNOWN = 0.25
+"""Share of a record in which that must be known."""
 
 
 def is_too_calm(comparison: Comparison, baseline: Baseline) -> bool:
     """Whether nothing says what is normal in the winds of a record.
 
-    Healthy recordings say it for their winds; without any, the certificates stand in, for the
-    winds of a calibration.
+    Healthy recordings say it for their winds, certificates for the winds of a calibration.
     """
-    if baseline.calibrated:
-        return False
-    return float(np.mean(comparison.speed >= CALIBRATED_FROM)) < FEWEST_CALIBRATED
+    return float(np.mean(comparison.speed >= baseline.slowest_wind)) < FEWEST_KNOWN
+
+
+def too_calm(baseline: Baseline) -> str:
+    """Why nothing is said about such a record."""
+    return (
+        f"the wind is below {baseline.slowest_wind:.1f} m/s nearly all the time, where "
+        "calibrations do not reach, and no healthy recording shows what is normal there"
+    )
 
 
 def need_calibration(terms: Sequence[Term]) -> bool:

@@ -177,6 +177,18 @@ class Problem:
         return np.asarray(np.array(columns).T, dtype=np.float64)
 
 
+def _secant(jacobian: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
+    """The smallest change of the derivatives that agrees with the last step (Broyden).
+
+    Args:
+        jacobian: Shape (m, parameters).
+        step: Of the parameters, shape (parameters,).
+        change: Of the white vector, shape (m,).
+    """
+    missed = change - jacobian @ step
+    return np.asarray(jacobian + np.outer(missed, step) / max(float(step @ step), 1e-12))
+
+
 def fit(
     whitener: Whitener,
     station: Station,
@@ -185,6 +197,9 @@ def fit(
     iterations: int = 8,
 ) -> Fit:
     """Fit terms by damped least squares within their bounds.
+
+    Derivatives are taken by differences at the start and where a step with those carried along
+    fails or gains little.
 
     Args:
         whitener: The null of the recording.
@@ -216,11 +231,14 @@ def fit(
     simulated = first
     damping = 1e-2
     normal = np.eye(len(values))
+    jacobian: FloatArray | None = None
+    exact = False
     for _ in range(iterations):
-        jacobian = problem.jacobian(values, vector, low, high)
+        if jacobian is None:
+            jacobian = problem.jacobian(values, vector, low, high)
+            exact = True
         normal = jacobian.T @ jacobian
         gradient = jacobian.T @ vector
-        improved = False
         gained = 0.0
         while damping < _LARGEST_DAMPING:
             weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
@@ -229,15 +247,20 @@ def fit(
             trial_cost, trial_vector, trial_simulated = problem.trial(trial)
             if trial_simulated is not None and trial_cost < cost:
                 gained = cost - trial_cost
+                jacobian = _secant(jacobian, (trial - values) / scale, trial_vector - vector)
                 values, vector, simulated, cost = (
                     trial, trial_vector, trial_simulated, trial_cost,
                 )  # fmt: skip
                 damping = max(damping * 0.2, 1e-6)
-                improved = True
+                break
+            if not exact:
                 break
             damping *= 8.0
-        if not improved or gained < 0.02 + 1e-5 * cost:
-            break
+        if gained < 0.02 + 1e-5 * cost:
+            if exact:
+                break
+            jacobian = None
+        exact = False
     seen = np.diag(normal) > _LEAST_INFORMATION
     covariance = np.diag(np.where(seen, 0.0, np.inf))
     width = np.array([p.high - p.low for p in parameters])

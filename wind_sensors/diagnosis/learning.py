@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.baseline import (
+    CALIBRATED_FROM,
     FREQUENCIES,
     Baseline,
     ChannelBaseline,
@@ -51,6 +52,9 @@ _STANDING_FACTOR = 1.3
 
 STANDING_MEAN_PRIOR = 0.7
 """Prior deviation of the shared amplitudes, in templates."""
+
+SELDOM = 0.1
+"""Winds below this quantile are too rare in healthy recordings to say what is normal."""
 
 LARGEST_SHARED_BANK = 4
 """Effects with more templates than this have no shared amplitude, only a scatter."""
@@ -363,8 +367,10 @@ def learn(
         for c in comparisons
         for t in templates_of(c, baseline.station, catalogue())
     }
+    speeds = np.concatenate([c.speed for c in comparisons])
     return replace(
         baseline,
+        slowest_wind=min(CALIBRATED_FROM, float(np.quantile(speeds, SELDOM))),
         loudest_gain=loudest_gain(rows, templates),
         recordings=tuple(r.name for r in recordings),
         means=means,

@@ -9,11 +9,11 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     ACCEPTED_FURTHER_GAIN,
     ACCEPTED_GAIN,
-    FURTHER_SHARE,
     SMALLEST_SIZE,
     Alternative,
     Judged,
     evidence,
+    inexact,
     judged,
     may_join,
     no_terms,
@@ -83,7 +83,7 @@ def merged(
     fits = searcher.refit_all(whitener, list(candidates.values()))
     promising = sorted((f for f in fits if plausible(f)), key=total)[:MERGE_FINALISTS]
     ranked = [r for r in judged(searcher, promising) if plausible(r.fit)]
-    margin = ACCEPTED_FURTHER_GAIN + FURTHER_SHARE * (nothing.cost - current.cost)
+    margin = ACCEPTED_FURTHER_GAIN + inexact(current, nothing.cost)
     if ranked and ranked[0].evidence < evidence(current, whitener) + margin:
         return ranked[0].fit
     return current

@@ -72,13 +72,14 @@ def name(
         searcher: Prepared search.
         progress: Called with the share done.
     """
-    found = _greedy(searcher, progress, frozenset())
+    whitener = searcher.whitener(searcher.bank.without)
+    singles = _single_fits(searcher, whitener)
+    found = _greedy(searcher, progress, whitener, singles, frozenset())
     broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
     if not broad or found.fit.active < BROAD_PARAMETERS:
         return found
-    narrow = _greedy(
-        searcher, progress, frozenset(n for n, e in searcher.effects.items() if e.everywhere)
-    )
+    everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
+    narrow = _greedy(searcher, progress, whitener, singles, everywhere)
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
     simpler = (
@@ -128,11 +129,65 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: 
     return inexact(current, float(nothing @ nothing)) if current.terms else 0.0
 
 
+def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
+    """Fits of the most promising effects, each alone."""
+    vector = whitener.of(searcher.bank.without)
+    return searcher.fit_all(
+        whitener,
+        (),
+        [
+            *searcher.single_candidates(whitener, vector, FIRST_CANDIDATES, blind=True),
+            *window_starts(searcher, whitener, vector, set()),
+        ],
+    )
+
+
+def _further_fits(
+    searcher: Searcher, whitener: Whitener, current: Fit, excluded: frozenset[str]
+) -> list[Fit]:
+    """Fits of the terms so far with one more each."""
+    used = {t.key for t in current.terms}
+
+    def eligible(starts: Sequence[Term]) -> bool:
+        return may_join(starts[0], current.terms) and starts[0].effect.name not in excluded
+
+    windowed = [
+        starts
+        for starts in window_starts(searcher, whitener, current.vector, used)
+        if eligible(starts)
+    ]
+    if not windowed:
+        scores = screen(
+            searcher.bank.templates, searcher.white_signatures(whitener), current.vector
+        )
+        if all(
+            s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
+        ):
+            return []
+    candidates = [
+        starts
+        for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
+        if eligible(starts) and not is_a_stall(searcher, current, starts[0])
+    ]
+    return searcher.fit_all(whitener, current.terms, [*candidates, *windowed])
+
+
 def _greedy(
-    searcher: Searcher, progress: Callable[[float], None] | None, excluded: frozenset[str]
+    searcher: Searcher,
+    progress: Callable[[float], None] | None,
+    whitener: Whitener,
+    singles: Sequence[Fit],
+    excluded: frozenset[str],
 ) -> Naming:
-    """Add the best effect, judge the noise again, and so on while it pays."""
-    whitener = searcher.whitener(searcher.bank.without)
+    """Add the best effect, judge the noise again, and so on while it pays.
+
+    Args:
+        searcher: The search.
+        progress: Called with the share done.
+        whitener: The null without any effect.
+        singles: Fits of single effects in it.
+        excluded: Names of effects that are not to be used.
+    """
     current = no_terms(whitener, searcher)
     screened = tuple(
         (s.effect, s.instrument, s.gain)
@@ -150,28 +205,10 @@ def _greedy(
             # What is left is judged as what the named effects, in another form, do not explain.
             whitener = searcher.whitener(named, named)
             current = seen_in(whitener, current)
-        used = {t.key for t in fixed}
-        number = FIRST_CANDIDATES if first else LATER_CANDIDATES
-        candidates = [
-            starts
-            for starts in searcher.single_candidates(whitener, current.vector, number, first)
-            if may_join(starts[0], fixed)
-            and starts[0].effect.name not in excluded
-            and not is_a_stall(searcher, current, starts[0])
-        ]
-        windowed = [
-            starts
-            for starts in window_starts(searcher, whitener, current.vector, used)
-            if may_join(starts[0], fixed) and starts[0].effect.name not in excluded
-        ]
-        if not first and not windowed:
-            scores = screen(
-                searcher.bank.templates, searcher.white_signatures(whitener), current.vector
-            )
-            if all(s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument)
-                   not in used):
-                break
-        fits = searcher.fit_all(whitener, fixed, [*candidates, *windowed])
+        if first:
+            fits = [f for f in singles if f.terms[0].effect.name not in excluded]
+        else:
+            fits = _further_fits(searcher, whitener, current, excluded)
         fits = sorted((f for f in fits if plausible(f)), key=total)
         needed = needed_gain(current, searcher.baseline.loudest_gain)
         if progress:
@@ -217,8 +254,8 @@ def _greedy(
     else:
         current = seen_in(whitener, current)
     if len(current.terms) > 1:
-        singles = [alone, *((term,) for a in alternatives for term in a.fit.terms)]
-        current = merged(searcher, whitener, pruned(searcher, whitener, current), singles)
+        known = [alone, *((term,) for a in alternatives for term in a.fit.terms)]
+        current = merged(searcher, whitener, pruned(searcher, whitener, current), known)
         if len(current.terms) > 1:
             current, alternatives = swapped(searcher, whitener, current)
         else:

@@ -112,30 +112,54 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
         order = np.argsort(time, kind="stable")
         time, turns = time[order], np.sort(turns)
     slots = min(rotor.pulses_per_revolution, time.size - 1)
-    beyond = 0.5 * (slots - 1) + 2.0
-    at = np.interp(
-        grid.edges,
-        _continued(_over_a_turn(time, slots), beyond),
-        _continued(_over_a_turn(turns, slots), beyond),
-    )
+    at = _turns_at(grid.edges, time, turns, slots)
     return np.asarray(
         np.diff(at) * (2.0 * np.pi * rotor.calibration_distance / grid.dt), dtype=np.float64
     )
 
 
-def _over_a_turn(values: FloatArray, slots: int) -> FloatArray:
-    """Means of so many successive values."""
-    if slots < 2:
-        return values
-    total = np.cumsum(np.concatenate(([0.0], values - values[0])))
-    return np.asarray((total[slots:] - total[:-slots]) / slots + values[0], dtype=np.float64)
+@compiled
+def _turns_at(at: FloatArray, time: FloatArray, turns: FloatArray, slots: int) -> FloatArray:
+    """Turns at given times, between the means over so many successive edges.
 
+    Straight on for two edges beyond the first and the last; constant from there on.
 
-def _continued(values: FloatArray, steps: float) -> FloatArray:
-    """Values with a straight continuation by so many steps at both ends."""
-    before = values[0] - steps * (values[1] - values[0])
-    after = values[-1] + steps * (values[-1] - values[-2])
-    return np.concatenate(([before], values, [after]))
+    Args:
+        at: Ascending, shape (n,).
+        time, turns: Of the edges, ascending, shape (m,), m > slots.
+        slots: Number of edges that are averaged.
+    """
+    beyond = 0.5 * (slots - 1) + 2.0
+    points = time.size - slots + 1
+    time_sum, turns_sum = 0.0, 0.0
+    for k in range(slots):
+        time_sum += time[k]
+        turns_sum += turns[k]
+    x_1, y_1 = time_sum / slots, turns_sum / slots
+    x_0 = x_1 - beyond * (time[slots] - time[0]) / slots
+    y_0 = y_1 - beyond * (turns[slots] - turns[0]) / slots
+    point = 0
+    out = np.empty(at.size)
+    for i in range(at.size):
+        while at[i] > x_1 and point < points:
+            point += 1
+            if point < points:
+                x_0, y_0 = x_1, y_1
+                time_sum += time[point + slots - 1] - time[point - 1]
+                turns_sum += turns[point + slots - 1] - turns[point - 1]
+                x_1, y_1 = time_sum / slots, turns_sum / slots
+            else:
+                time_step, turns_step = x_1 - x_0, y_1 - y_0
+                x_0, y_0 = x_1, y_1
+                x_1 += beyond * time_step
+                y_1 += beyond * turns_step
+        if at[i] >= x_1:
+            out[i] = y_1
+        elif at[i] <= x_0:
+            out[i] = y_0
+        else:
+            out[i] = y_0 + (y_1 - y_0) * (at[i] - x_0) / (x_1 - x_0)
+    return out
 
 
 def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
@@ -290,16 +314,18 @@ def _interval_statistics(
     long = 0
     short = 0
     counted = 0
+    bins_per_second = 1.0 / dt
+    last_bin = weight.size - 1
     for i in range(window, edges - 1 - window):
-        place = min(max(int(time[i] / dt), 0), weight.size - 1)
+        place = min(max(int(time[i] * bins_per_second), 0), last_bin)
         if weight[place] <= 0.5:
             continue
-        local = (time[i + half + 1] - time[i - half]) / window
-        relative = (time[i + 1] - time[i]) / max(local, 1e-9)
+        around = time[i + half + 1] - time[i - half]
+        interval = (time[i + 1] - time[i]) * window
         counted += 1
-        if relative > 1.6:
+        if interval > 1.6 * around:
             long += 1
-        elif relative < 0.4:
+        elif interval < 0.4 * around:
             short += 1
     if counted < 100:
         return out
@@ -307,52 +333,50 @@ def _interval_statistics(
     out[1] = short / counted
     if slots < 3:
         return out
-    total = np.zeros(slots)
-    number = np.zeros(slots)
+    # By slot: number, deviation, and both times the wind's direction once and twice per turn.
+    number = np.zeros((slots, 5))
+    total = np.zeros((slots, 5))
     squares = 0.0
-    angle = 2.0 * math.pi / slots * np.arange(slots)
-    slot_cos, slot_sin = np.cos(angle), np.sin(angle)
-    wind_cos, wind_sin = np.cos(direction), np.sin(direction)
-    locked = np.zeros(4)
-    away = np.zeros((slots, 4))
-    seen = np.empty(4)
+    wind = np.empty((weight.size, 4))
+    wind[:, 0], wind[:, 1] = np.cos(direction), np.sin(direction)
+    wind[:, 2], wind[:, 3] = np.cos(2.0 * direction), np.sin(2.0 * direction)
     first = slots // 2
     slot = first - 1
     kept = 0
     for j in range(edges - slots):
         i = j + first
         slot = 0 if slot + 1 == slots else slot + 1
-        place = min(max(int(time[i] / dt), 0), weight.size - 1)
+        place = min(max(int(time[i] * bins_per_second), 0), last_bin)
         if weight[place] <= 0.5:
             continue
-        revolution = (time[j + slots] - time[j]) / slots
-        deviation = (time[i + 1] - time[i]) / max(revolution, 1e-9) - 1.0
+        revolution = max(time[j + slots] - time[j], 1e-9)
+        deviation = (time[i + 1] - time[i]) * slots / revolution - 1.0
         deviation = min(max(deviation, -0.8), 0.8)
-        total[slot] += deviation
-        number[slot] += 1.0
         squares += deviation * deviation
         kept += 1
-        c, s = slot_cos[slot], slot_sin[slot]
-        seen[0] = c * wind_cos[place] + s * wind_sin[place]
-        seen[1] = s * wind_cos[place] - c * wind_sin[place]
-        seen[2] = seen[0] * seen[0] - seen[1] * seen[1]
-        seen[3] = 2.0 * seen[0] * seen[1]
+        number[slot, 0] += 1.0
+        total[slot, 0] += deviation
         for m in range(4):
-            locked[m] += deviation * seen[m]
-            away[slot, m] += seen[m]
+            number[slot, m + 1] += wind[place, m]
+            total[slot, m + 1] += deviation * wind[place, m]
     if kept < 100:
         return out
-    means = total / np.maximum(number, 1.0)
-    for m in range(4):
-        # What is fixed to the disc says nothing about the wind's direction.
-        locked[m] -= np.sum(means * away[:, m])
+    means = total[:, 0] / np.maximum(number[:, 0], 1.0)
+    angle = 2.0 * math.pi / slots * np.arange(slots)
+    slot_cos, slot_sin = np.cos(angle), np.sin(angle)
     error = max(squares / kept - np.mean(means**2), 0.0) / kept
     once = (2.0 * np.sum(means * slot_cos) / slots) ** 2
     once += (2.0 * np.sum(means * slot_sin) / slots) ** 2
     once = max(once - 4.0 * error, 0.0)
     out[2] = math.sqrt(max(np.var(means) - 0.5 * once - error * slots, 0.0))
     out[3] = math.sqrt(once)
-    out[4] = 2.0 * math.hypot(locked[0], locked[1]) / kept
-    if slots > 4:
-        out[5] = 2.0 * math.hypot(locked[2], locked[3]) / kept
+    for m in range(2 if slots > 4 else 1):
+        if m == 1:
+            slot_cos, slot_sin = np.cos(2.0 * angle), np.sin(2.0 * angle)
+        # What is fixed to the disc says nothing about the wind's direction.
+        away = total[:, 2 * m + 1] - means * number[:, 2 * m + 1]
+        across = total[:, 2 * m + 2] - means * number[:, 2 * m + 2]
+        along = np.sum(slot_cos * away + slot_sin * across)
+        aside = np.sum(slot_sin * away - slot_cos * across)
+        out[4 + m] = 2.0 * math.hypot(along, aside) / kept
     return out

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.calibrated_range import TOO_CALM, is_too_calm, need_calibration
+from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration, too_calm
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
@@ -50,10 +50,13 @@ may differ from the simulation's."""
 REMAINDER_SHARE = 0.02
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
-RIVAL_SHARE = 0.3
+RIVAL_SHARE = 0.1
 """A smaller remainder with this share of it says as much: it rivals what was named."""
 
 REMAINDER_P = 0.05
+
+MOST_SHARED = 1.25
+"""Largest sum of the shares of the misfit that two effects explain in the other's presence."""
 
 MOST_FREE_PARAMETERS = 2
 """An explanation with more parameters must also stand out somewhere in the data."""
@@ -122,6 +125,18 @@ def _patchwork(naming: Naming) -> bool:
     """Whether passing effects were pieced together on one instrument: nothing known fits."""
     passing = [t.instrument for t in naming.fit.terms if t.interval != ALWAYS]
     return len(passing) != len(set(passing))
+
+
+def _made_up(findings: tuple[Finding, ...]) -> bool:
+    """Whether several effects were put together that the data do not show one by one.
+
+    One of them stands out nowhere, or they undo each other: each has to make good what the other
+    does.
+    """
+    own = [f for f in findings if f.proof is not None]
+    if len(own) < 2:
+        return False
+    return any(f.p > REMAINDER_P for f in own) or sum(f.share for f in own) > MOST_SHARED
 
 
 def _structured(found: list[Found]) -> list[Found]:
@@ -260,6 +275,8 @@ def diagnose(
     if refuted:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
         verdict, findings = "none", ()
+    if _made_up(findings):
+        verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)
@@ -269,7 +286,7 @@ def diagnose(
     if verdict == "unknown" or remainder[1] < REMAINDER_P:
         description = _description(after[0])
     if calm:
-        description = TOO_CALM
+        description = too_calm(baseline)
     if refuted:
         description = (
             f"{refuted_names} would fit, but no region stands out and blocks that were not fitted "

@@ -20,6 +20,10 @@ FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 
+CLOSE = 1e-8
+"""A Newton step this small leaves an error of the order of its square."""
+
+
 @compiled
 def _crossing(p_0: float, p_1: float, slope_0: float, slope_1: float, level: float) -> float:
     """Where in [0, 1] a cubic with given ends and end slopes passes a level between its ends.
@@ -41,7 +45,7 @@ def _crossing(p_0: float, p_1: float, slope_0: float, slope_1: float, level: flo
         following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        if abs(following - u) < 1e-14:
+        if abs(following - u) < CLOSE:
             return following
         u = following
     return u
@@ -71,6 +75,8 @@ def _edges_of(
     count = 0
     known = False
     ahead = 0
+    slot = 0
+    turned = 0.0
     ahead_level = 0.0
     for i in range(psi.shape[0] - 1):
         a, b = psi[i], psi[i + 1]
@@ -82,7 +88,9 @@ def _edges_of(
                 ahead = math.floor(a / width) - 2
                 while True:
                     turn = ahead // slots
-                    ahead_level = 2.0 * math.pi * turn + slot_angles[ahead - turn * slots]
+                    slot = ahead - turn * slots
+                    turned = 2.0 * math.pi * turn
+                    ahead_level = turned + slot_angles[slot]
                     if ahead_level > a:
                         break
                     ahead += 1
@@ -93,8 +101,11 @@ def _edges_of(
                 numbers[count] = ahead
                 count += 1
                 ahead += 1
-                turn = ahead // slots
-                ahead_level = 2.0 * math.pi * turn + slot_angles[ahead - turn * slots]
+                slot += 1
+                if slot == slots:
+                    slot = 0
+                    turned = 2.0 * math.pi * (ahead // slots)
+                ahead_level = turned + slot_angles[slot]
             continue
         known = False
         number = math.floor(a / width) + 2
