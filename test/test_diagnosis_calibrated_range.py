@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline
 from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration
 from wind_sensors.diagnosis.comparison import Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import Term
-from wind_sensors.diagnosis.learning import default_baseline
+from wind_sensors.diagnosis.learning import default_baseline, learn
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation.run import simulate
 from wind_sensors.simulation.scenario import Scenario
@@ -40,8 +40,20 @@ def test_below_the_calibrated_winds_only_healthy_recordings_help(speed: float, c
     comparison = compared(speed)
     certificates = default_baseline(station())
     assert is_too_calm(comparison, certificates) is calm
-    learnt: Baseline = replace(certificates, recordings=("healthy",))
-    assert not is_too_calm(comparison, learnt)
+    in_the_same_wind: Baseline = replace(certificates, slowest_wind=0.8 * speed)
+    assert not is_too_calm(comparison, in_the_same_wind)
+
+
+def test_healthy_recordings_say_what_is_normal_in_their_winds_only() -> None:
+    scenarios = [
+        Scenario(wind=TurbulenceSpec(mean_speed=speed, direction=0.5, seed=k), duration=120.0)
+        for k, speed in enumerate((2.0, 8.0))
+    ]
+    calm, windy = (simulate(station(), scenario) for scenario in scenarios)
+    assert 0.5 < learn([calm]).slowest_wind < 2.0
+    assert learn([windy]).slowest_wind == CALIBRATED_FROM
+    assert not is_too_calm(prepare(calm), learn([calm, windy]))
+    assert is_too_calm(prepare(calm), learn([windy]))
 
 
 def test_a_reading_that_repeats_is_told_in_any_wind() -> None:

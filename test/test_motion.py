@@ -256,12 +256,17 @@ def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth):
 @settings(max_examples=50)
 @given(
     st.floats(-20.0, 20.0), st.floats(-15.0, 15.0), st.floats(-15.0, 15.0),
-    st.floats(0.7, 1.4), st.sampled_from(["enu", "ned"]), st.sampled_from(["platform", "earth"]),
+    st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(0.7, 1.4),
+    st.sampled_from(["enu", "ned"]), st.sampled_from(["platform", "earth"]),
     st.floats(-30.0, 30.0),
 )  # fmt: skip
-def test_what_a_platform_reports_leads_back_to_what_it_did(a, b, c, scale, frame, axes, north):
+def test_what_a_platform_reports_leads_back_to_what_it_did(
+    a, b, c, d, e, scale, frame, axes, north
+):
     platform = Platform(
-        heading_deviation=HeadingDeviation(constant_deg=a, sine_deg=b, cosine_deg=c),
+        heading_deviation=HeadingDeviation(
+            constant_deg=a, sine_deg=b, cosine_deg=c, sine_2_deg=d, cosine_2_deg=e
+        ),
         velocity_scale=scale, frame=frame, velocity_axes=axes, heading_reference="magnetic",
         magnetic_declination_deg=north,
     )  # fmt: skip
@@ -277,7 +282,9 @@ def test_what_a_platform_reports_leads_back_to_what_it_did(a, b, c, scale, frame
 
 def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading():
     platform = Platform(
-        heading_deviation=HeadingDeviation(constant_deg=2.0, sine_deg=5.0, cosine_deg=-3.0),
+        heading_deviation=HeadingDeviation(
+            constant_deg=2.0, sine_deg=5.0, cosine_deg=-3.0, sine_2_deg=1.5, cosine_2_deg=-0.8
+        ),
         heading_reference="magnetic", magnetic_declination_deg=8.0,
     )  # fmt: skip
     headings = np.arange(0.0, 360.0, 30.0)
@@ -288,6 +295,7 @@ def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading():
     shown = frames.compass_from_yaw(frames.heading_of(reported_motion(platform, motion).attitude))
     magnetic = np.radians(headings - 8.0)
     expected = headings - 8.0 + 2.0 + 5.0 * np.sin(magnetic) - 3.0 * np.cos(magnetic)
+    expected += 1.5 * np.sin(2.0 * magnetic) - 0.8 * np.cos(2.0 * magnetic)
     assert np.abs((shown - expected + 180.0) % 360.0 - 180.0).max() < 1e-9
 
 

@@ -16,7 +16,7 @@ from wind_sensors.diagnosis.regions import Found, RegionBank, strongest
 EQUAL_LIKELIHOOD = 3.0
 """Explanations whose log-likelihoods lie closer are reported together."""
 
-EQUAL_SHARE = 0.02
+EQUAL_SHARE = 0.03
 """So are those that miss the winner by less than this share of its gain: the simulation is not
 exact enough to tell them apart."""
 

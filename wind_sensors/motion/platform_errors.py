@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def heading_error(deviation: HeadingDeviation, heading: npt.ArrayLike) -> FloatArray:
-    """Compass error A + B sin(heading) + C cos(heading) [rad], clockwise positive.
+    """Compass error A + B sin h + C cos h + D sin 2h + E cos 2h [rad], clockwise positive.
 
     Args:
         deviation: Its coefficients.
@@ -28,7 +28,11 @@ def heading_error(deviation: HeadingDeviation, heading: npt.ArrayLike) -> FloatA
     """
     h = np.asarray(heading, dtype=np.float64)
     error: FloatArray = np.radians(
-        deviation.constant_deg + deviation.sine_deg * np.sin(h) + deviation.cosine_deg * np.cos(h)
+        deviation.constant_deg
+        + deviation.sine_deg * np.sin(h)
+        + deviation.cosine_deg * np.cos(h)
+        + deviation.sine_2_deg * np.sin(2.0 * h)
+        + deviation.cosine_2_deg * np.cos(2.0 * h)
     )
     return error
 
@@ -40,10 +44,13 @@ def heading_without_error(deviation: HeadingDeviation, reported: npt.ArrayLike) 
     """
     target = np.asarray(reported, dtype=np.float64)
     b, c = np.radians(deviation.sine_deg), np.radians(deviation.cosine_deg)
+    d, e = np.radians(deviation.sine_2_deg), np.radians(deviation.cosine_2_deg)
     heading = target - heading_error(deviation, target)
     for _ in range(6):
         excess = heading + heading_error(deviation, heading) - target
-        heading = heading - excess / (1.0 + b * np.cos(heading) - c * np.sin(heading))
+        slope = b * np.cos(heading) - c * np.sin(heading)
+        slope += 2.0 * (d * np.cos(2.0 * heading) - e * np.sin(2.0 * heading))
+        heading = heading - excess / (1.0 + slope)
     result: FloatArray = heading
     return result
 

@@ -322,7 +322,7 @@ class Air(Entry):
 
 
 class HeadingDeviation(Entry):
-    """Compass error added to the true heading: A + B sin(heading) + C cos(heading)."""
+    """Compass error added to the true heading h: A + B sin h + C cos h + D sin 2h + E cos 2h."""
 
     constant_deg: float = 0.0
     """A"""
@@ -330,6 +330,10 @@ class HeadingDeviation(Entry):
     """B"""
     cosine_deg: float = 0.0
     """C"""
+    sine_2_deg: float = 0.0
+    """D"""
+    cosine_2_deg: float = 0.0
+    """E"""
 
 
 class Downwash(Entry):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.motion.frames import heading_of
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import (
     HeadingDeviation,
@@ -20,6 +21,12 @@ Entry = Instrument | Platform
 
 DEAD_SHARE = 0.2
 """A log that shows less than this share of what the positions' change shows is dead."""
+
+SECTORS = 8
+FEWEST_SECTORS = 6
+SHORTEST_VISIT = 0.01
+"""A carrier that spends this share of the record in each of so many of these sectors of heading
+shows what its compass does twice a turn."""
 
 
 def _is_platform(entry: Entry, station: Station) -> bool:
@@ -139,32 +146,46 @@ def _deviation(entry: Entry, values: Values) -> dict[str, Any]:
             constant_deg=stated.constant_deg + values["constant"],
             sine_deg=stated.sine_deg + values["sine"],
             cosine_deg=stated.cosine_deg + values["cosine"],
+            sine_2_deg=stated.sine_2_deg + values["sine_2"],
+            cosine_2_deg=stated.cosine_2_deg + values["cosine_2"],
         )
     }
 
 
 def _deviation_size(values: Values) -> float:
-    return max(abs(values["constant"]), math.hypot(values["sine"], values["cosine"])) / 2.0
+    once = math.hypot(values["sine"], values["cosine"])
+    twice = math.hypot(values["sine_2"], values["cosine_2"])
+    return max(abs(values["constant"]), once, twice) / 2.0
+
+
+def _goes_round(drive: Drive) -> bool:
+    """Whether the carrier shows its compass on headings all around."""
+    if drive.motion is None:
+        return False
+    heading = np.mod(heading_of(drive.motion.attitude), 2.0 * np.pi)
+    visits = np.bincount((heading * (SECTORS / (2.0 * np.pi))).astype(np.intp), minlength=SECTORS)
+    return int(np.count_nonzero(visits > SHORTEST_VISIT * heading.size)) >= FEWEST_SECTORS
 
 
 HEADING_DEVIATION = Effect(
     name="heading_deviation",
     meaning="The compass deviates, by a constant and with the heading.",
     entrance="wind",
-    equation="heading reported = heading + A + B sin(heading) + C cos(heading)",
-    source="compass deviation, coefficients A, B, C",
+    equation="heading h reported as h + A + B sin h + C cos h + D sin 2h + E cos 2h",
+    source="compass deviation, coefficients A to E",
     region="with the carrier's heading",
     parameters=(
         Parameter("constant", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
         Parameter("sine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
         Parameter("cosine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
+        Parameter("sine_2", "deg", -15.0, 15.0, minimum=2.0, step=0.5, free=_goes_round),
+        Parameter("cosine_2", "deg", -15.0, 15.0, minimum=2.0, step=0.5, free=_goes_round),
     ),
     applies=_is_platform,
     update=_deviation,
-    templates=(
-        {"constant": 2.0, "sine": 0.0, "cosine": 0.0},
-        {"constant": 0.0, "sine": 2.0, "cosine": 0.0},
-        {"constant": 0.0, "sine": 0.0, "cosine": 2.0},
+    templates=tuple(
+        {**dict.fromkeys(("constant", "sine", "cosine", "sine_2", "cosine_2"), 0.0), name: 2.0}
+        for name in ("constant", "sine", "cosine")
     ),
     confusable={
         "vane_offset": "a full circle: a compass error changes with the heading",
