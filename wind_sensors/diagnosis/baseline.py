@@ -22,6 +22,9 @@ calibration is continued to the starting speed, near which it cannot hold."""
 FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 """Frequencies at which a baseline keeps its curves [Hz]."""
 
+WAVENUMBERS = np.geomspace(0.004, 0.15, 6)
+"""Frequencies over the wind's speed at which a baseline keeps the level of the noise [1/m]."""
+
 _BANDS = len(NORMALISED_BANDS) - 1
 _SPECTRUM_PRIOR = 0.22
 _INTERVAL_PRIOR = np.array([0.002, 0.002, 0.003, 0.001, 0.0007, 0.001])
@@ -47,12 +50,16 @@ class ChannelBaseline:
             `FREQUENCIES`.
         low_ratio: Noise variance relative to that just above the low end, at `FREQUENCIES`.
         statistics_mean, statistics_deviation: Of measured minus simulated statistics.
+        noise_mean, noise_deviation: Of the logarithm of the residual's spectrum relative to the
+            signal's, at `WAVENUMBERS`; an infinite deviation where nothing is known.
     """
 
     exponent: FloatArray
     low_ratio: FloatArray
     statistics_mean: FloatArray
     statistics_deviation: FloatArray
+    noise_mean: FloatArray
+    noise_deviation: FloatArray
 
     def exponent_at(self, frequency: FloatArray) -> FloatArray:
         """Exponents at other frequencies [Hz]."""
@@ -125,7 +132,7 @@ class Baseline:
             "original": self.original.model_dump(mode="json"),
             "station": self.station.model_dump(mode="json"),
             "channels": {
-                name: {k: np.asarray(v).tolist() for k, v in asdict(c).items()}
+                name: {k: _listed(v) for k, v in asdict(c).items()}
                 for name, c in self.channels.items()
             },
             "means": dict(self.means),
@@ -149,7 +156,7 @@ class Baseline:
                 original=Station.model_validate(content["original"]),
                 station=Station.model_validate(content["station"]),
                 channels={
-                    name: ChannelBaseline(**{k: np.asarray(v) for k, v in c.items()})
+                    name: ChannelBaseline(**{k: _unlisted(v) for k, v in c.items()})
                     for name, c in content["channels"].items()
                 },
                 means=content["means"],
@@ -159,6 +166,15 @@ class Baseline:
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem
+
+
+def _listed(values: FloatArray) -> list[float | None]:
+    """An array for JSON, which knows no infinity."""
+    return [float(v) if np.isfinite(v) else None for v in values]
+
+
+def _unlisted(values: list[float | None]) -> FloatArray:
+    return np.array([np.inf if v is None else v for v in values])
 
 
 def _commissioned(
@@ -194,4 +210,6 @@ def default_channel(channel: Channel) -> ChannelBaseline:
         low_ratio=np.ones(FREQUENCIES.size),
         statistics_mean=np.zeros(prior.size),
         statistics_deviation=2.0 * prior,
+        noise_mean=np.zeros(WAVENUMBERS.size),
+        noise_deviation=np.full(WAVENUMBERS.size, np.inf),
     )

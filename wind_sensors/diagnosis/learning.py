@@ -20,6 +20,7 @@ from wind_sensors.diagnosis.baseline import (
 from wind_sensors.diagnosis.comparison import LOW_END, Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, with_effect
+from wind_sensors.diagnosis.noise_level import learnt_levels, levels
 from wind_sensors.diagnosis.observation import channels_of
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import (
@@ -130,6 +131,17 @@ def _statistics(
     variance = (squares + _PRIOR_STRENGTH * prior**2) / (count + _PRIOR_STRENGTH - 1.0)
     variance = variance * (1.0 + 1.0 / (count + 0.25))
     return mean, np.sqrt(variance)
+
+
+def _noise(
+    comparisons: Sequence[Comparison], station: Station, baseline: Baseline, name: str
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and deviation of the residual's level."""
+    channel = next(c for c in channels_of(station) if c.name == name)
+    known = baseline.channels[name]
+    return learnt_levels(
+        np.array([levels(c, c.simulate(station), known, channel)[0] for c in comparisons])
+    )
 
 
 def _commissioned(
@@ -341,11 +353,14 @@ def learn(
                 continue
             low = _low_ratios(of(name), current, known, name)
             mean, deviation = _statistics(of(name), current, name)
+            noise_mean, noise_deviation = _noise(of(name), current, known, name)
             channels[name] = replace(
                 channels[name],
                 low_ratio=low,
                 statistics_mean=mean,
                 statistics_deviation=deviation,
+                noise_mean=noise_mean,
+                noise_deviation=noise_deviation,
             )
         return replace(known, channels=channels)
 

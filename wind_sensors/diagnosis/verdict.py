@@ -19,6 +19,7 @@ from wind_sensors.diagnosis.findings import Finding, Unexplained, equal_explanat
 from wind_sensors.diagnosis.fitting import ALWAYS, planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
+from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
 from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
 from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
@@ -54,6 +55,11 @@ RIVAL_SHARE = 0.1
 """A smaller remainder with this share of it says as much: it rivals what was named."""
 
 REMAINDER_P = 0.05
+
+NOISY = 5.0
+VERY_NOISY = 8.0
+"""Noise beyond this many standard deviations of healthy days is physics that a name left out;
+without any name, where a reference of another day may err more, beyond the second."""
 
 MOST_SHARED = 1.25
 """Largest sum of the shares of the misfit that two effects explain in the other's presence."""
@@ -194,9 +200,12 @@ def _verdict(
     remainder: tuple[float, float, float],
     detectable: Mapping[str, tuple[float, str, float]],
     located_p: float,
+    excess: Excess,
 ) -> Verdict:
     left, p, share = remainder
     structured = left > 1.0 and p < REMAINDER_P
+    if excess.score > (NOISY if naming.fit.terms else VERY_NOISY):
+        return "unknown"
     if not naming.fit.terms:
         if structured:
             return "unknown"
@@ -260,7 +269,8 @@ def diagnose(
     detectable = smallest_detectable(searcher, whitener)
     equal = equal_explanations(naming)
     located_p = bank.p_value(max(f.score for f in before))
-    verdict = _verdict(naming, equal, remainder, detectable, located_p)
+    excess = excess_of(comparison, naming.fit.simulated, baseline)
+    verdict = _verdict(naming, equal, remainder, detectable, located_p, excess)
     calm = is_too_calm(comparison, baseline) and verdict != "none" and (
         not naming.fit.terms or need_calibration(naming.fit.terms)
     )
@@ -285,6 +295,8 @@ def diagnose(
     description = ""
     if verdict == "unknown" or remainder[1] < REMAINDER_P:
         description = _description(after[0])
+    if verdict == "unknown" and excess.score > VERY_NOISY:
+        description = described(excess)
     if calm:
         description = too_calm(baseline)
     if refuted:
