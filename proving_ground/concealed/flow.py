@@ -38,13 +38,17 @@ def wake_shadow(scene: Scene, amount: float, activity: Array) -> Parameters:
 
 
 def flow_distortion(scene: Scene, amount: float, activity: Array) -> Parameters:
-    """Flow past a mast and its boom: a doublet with the source of the wake it leaves."""
+    """Flow past a mast and its boom: a doublet with the source of the wake it leaves.
+
+    Where the wind comes from an angle a to the axis of either, it is faster by c cos(n a) and turned
+    by -c sin(n a): a flow without vorticity cannot do one without the other.
+    """
     toward = float(scene.rng.uniform(-np.pi, np.pi))
     doublet = float(scene.rng.uniform(0.6, 1.0))
     source = 1.0 - doublet
     angle = scene.bearing_from(scene.rotor_flow) - toward
     speed = amount * activity * (doublet * np.cos(2.0 * angle) + source * np.cos(angle))
-    bend = amount * activity * (doublet * np.sin(2.0 * angle) + source * np.sin(angle))
+    bend = -amount * activity * (doublet * np.sin(2.0 * angle) + source * np.sin(angle))
     scene.rotor_flow *= (1.0 + speed)[:, None]
     scene.vane_flow *= (1.0 + speed)[:, None]
     _turn_flow(scene.rotor_flow, bend)

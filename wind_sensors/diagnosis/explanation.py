@@ -37,8 +37,15 @@ ACCEPTED_ELSEWHERE_GAIN = 22.0
 FURTHER_SHARE = 0.05
 """A further effect on the same signals must also bring this share of the gain so far."""
 
-LARGEST_INEXACTNESS = 150.0
-"""But never more than this."""
+LARGEST_INEXACTNESS = 500.0
+"""But never more than this,"""
+
+LARGEST_EXACT_INEXACTNESS = 150.0
+"""nor than this beside effects whose form is certain."""
+
+EQUAL_SHARE = 0.03
+"""Explanations that differ by less than this share of the gain are equal: the simulation is not
+exact enough to tell them apart."""
 
 MOMENTS = 24
 """Parts of the record."""
@@ -81,7 +88,9 @@ def inexact(current: Fit, nothing: float) -> float:
         nothing: Cost without any effect.
     """
     share = FURTHER_SHARE * (nothing - current.cost)
-    return min(max(share, ACCEPTED_FURTHER_GAIN), LARGEST_INEXACTNESS)
+    exact = all(term.effect.exact for term in current.terms)
+    largest = LARGEST_EXACT_INEXACTNESS if exact else LARGEST_INEXACTNESS
+    return min(max(share, ACCEPTED_FURTHER_GAIN), largest)
 
 
 @dataclass(frozen=True)

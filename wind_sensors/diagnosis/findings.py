@@ -8,17 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.explanation import Alternative, Naming
+from wind_sensors.diagnosis.explanation import EQUAL_SHARE, Alternative, Naming
 from wind_sensors.diagnosis.fitting import Fit, Term, planted
 from wind_sensors.diagnosis.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, strongest
 
 EQUAL_LIKELIHOOD = 3.0
 """Explanations whose log-likelihoods lie closer are reported together."""
-
-EQUAL_SHARE = 0.03
-"""So are those that miss the winner by less than this share of its gain: the simulation is not
-exact enough to tell them apart."""
 
 LEAST_LIKENESS = 0.6
 """Cosine between the white corrections of two explanations of the same thing."""

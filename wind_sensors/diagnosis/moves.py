@@ -83,9 +83,12 @@ def merged(
     fits = searcher.refit_all(whitener, list(candidates.values()))
     promising = sorted((f for f in fits if plausible(f)), key=total)[:MERGE_FINALISTS]
     ranked = [r for r in judged(searcher, promising) if plausible(r.fit)]
-    margin = ACCEPTED_FURTHER_GAIN + inexact(current, nothing.cost)
-    if ranked and ranked[0].evidence < evidence(current, whitener) + margin:
-        return ranked[0].fit
+    if not ranked:
+        return current
+    alone = ranked[0]
+    margin = ACCEPTED_FURTHER_GAIN + inexact(alone.fit, nothing.cost)
+    if alone.evidence < evidence(current, whitener) + margin:
+        return alone.fit
     return current
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
+    EQUAL_SHARE,
     Alternative,
     Judged,
     Naming,
@@ -93,7 +94,8 @@ def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
     """Whether an explanation fits clearly better than another."""
     first, second = judged(searcher, [one.fit, other.fit])
     wins = [t.key for t in first.fit.terms] == [t.key for t in one.fit.terms]
-    return wins and first.evidence < second.evidence - CLEARLY_BETTER
+    margin = max(CLEARLY_BETTER, EQUAL_SHARE * other.gain)
+    return wins and first.evidence < second.evidence - margin
 
 
 def _brings(

@@ -27,7 +27,7 @@ _FEWEST = 8.0
 """Coefficients that a window needs."""
 
 _PRIOR_STRENGTH = 3.0
-_PRIOR = np.array([0.4, 0.2, 0.15, 0.12, 0.12, 0.15])
+EXPECTED_SCATTER = np.array([0.4, 0.2, 0.15, 0.12, 0.12, 0.15])
 """Standard deviation of the logarithms between healthy days before any is seen."""
 
 
@@ -90,7 +90,7 @@ def learnt_levels(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     filled = np.where(seen, rows, 0.0)
     mean = filled.sum(axis=0) / np.maximum(count, 1)
     squares = np.where(seen, (rows - mean) ** 2, 0.0).sum(axis=0)
-    variance = (squares + _PRIOR_STRENGTH * _PRIOR**2) / (
+    variance = (squares + _PRIOR_STRENGTH * EXPECTED_SCATTER**2) / (
         np.maximum(count, 1) - 1.0 + _PRIOR_STRENGTH
     )
     deviation = np.sqrt(variance * (1.0 + 1.0 / np.maximum(count, 1)))

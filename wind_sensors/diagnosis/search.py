@@ -48,7 +48,7 @@ COMMON_LAG = 0.5
 SINGLE_LAG = 0.25
 """The same of what a channel adds of its own, and of the change within half a record."""
 
-CANDIDATE_ITERATIONS = 4
+CANDIDATE_ITERATIONS = 6
 """Gauss-Newton steps of a candidate's fit; the best few are fitted to the end."""
 
 TRIED_STARTS = 2

@@ -52,7 +52,9 @@ REMAINDER_SHARE = 0.02
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
 RIVAL_SHARE = 0.1
-"""A smaller remainder with this share of it says as much: it rivals what was named."""
+RIVAL_SCORE = 0.4
+"""A smaller remainder, of this part of the score, with this share of it says as much: it rivals
+what was named."""
 
 REMAINDER_P = 0.05
 
@@ -216,7 +218,7 @@ def _verdict(
     if naming.fit.active > MOST_FREE_PARAMETERS and located_p > REMAINDER_P:
         # Many parameters that no region of the data asks for.
         return "none"
-    rivals = p < REMAINDER_P and share > RIVAL_SHARE
+    rivals = left > RIVAL_SCORE and p < REMAINDER_P and share > RIVAL_SHARE
     if (structured and share > REMAINDER_SHARE) or rivals or _patchwork(naming):
         return "unknown"
     return "ambiguous" if equal else "named"

@@ -89,6 +89,8 @@ class Effect:
             and again.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
             look like that, so a beginning or an end inside the record needs more evidence.
+        exact: Its form is certain (geometry, electronics, arithmetic); what others leave beside
+            them may be their own form.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.
@@ -110,6 +112,7 @@ class Effect:
     contains: frozenset[str] = frozenset()
     occasional: bool = False
     smooths: bool = False
+    exact: bool = False
     standing: float = 0.1
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None

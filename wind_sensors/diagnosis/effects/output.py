@@ -177,6 +177,7 @@ STUCK_SENSOR = Effect(
     ),
     applies=_is_sensor,
     update=_outage,
+    exact=True,
     templates=(),
     confusable={
         "vane_friction": "turn the vane by hand",
@@ -213,6 +214,7 @@ TIMESTAMP_LATENCY = Effect(
     ),
     applies=_is_sensor,
     update=_latency,
+    exact=True,
     templates=({"latency": 0.15}, {"latency": 0.6}),
     confusable={
         "rotor_inertia": "a speed sweep: the lag of inertia is a length, of a clock a time",
@@ -244,6 +246,7 @@ CLOCK_DRIFT = Effect(
     applies=_is_sensor,
     update=_drift,
     shared=True,
+    exact=True,
     templates=({"drift": 500.0},),
     confusable={"timestamp_latency": "a longer record: the lag of a drift grows"},
 )

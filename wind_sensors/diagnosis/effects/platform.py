@@ -72,6 +72,7 @@ PLATFORM_VELOCITY = Effect(
     ),
     applies=_is_platform,
     update=_share,
+    exact=True,
     templates=({"velocity_share": 0.9, "position_share": 0.0},),
     confusable={
         "platform_velocity_scale": "a run at another speed against an independent log",
@@ -97,6 +98,7 @@ PLATFORM_VELOCITY_SCALE = Effect(
     ),
     applies=_is_platform,
     update=_velocity_scale,
+    exact=True,
     templates=({"velocity_scale": 1.05},),
     confusable={
         "platform_velocity": "a run at another speed against an independent log",
@@ -128,6 +130,7 @@ LEVER_ARM = Effect(
     ),
     applies=_is_platform,
     update=_lever,
+    exact=True,
     templates=(
         {"dx": 0.5, "dy": 0.0, "dz": 0.0},
         {"dx": 0.0, "dy": 0.5, "dz": 0.0},
@@ -183,6 +186,7 @@ HEADING_DEVIATION = Effect(
     ),
     applies=_is_platform,
     update=_deviation,
+    exact=True,
     templates=tuple(
         {**dict.fromkeys(("constant", "sine", "cosine", "sine_2", "cosine_2"), 0.0), name: 2.0}
         for name in ("constant", "sine", "cosine")
@@ -226,6 +230,7 @@ FRAME_ERROR = Effect(
     ),
     applies=_is_platform,
     update=_rotation,
+    exact=True,
     templates=(
         {"roll": 3.0, "pitch": 0.0, "velocity_turn": 0.0},
         {"roll": 0.0, "pitch": 3.0, "velocity_turn": 0.0},

@@ -38,6 +38,7 @@ CALIBRATION_DRIFT = Effect(
     parameters=(Parameter("gain", "1", 0.4, 2.0, healthy=1.0, minimum=0.01, step=0.004),),
     applies=_is_rotor,
     update=_gain,
+    exact=True,
     templates=({"gain": 1.01},),
     confusable={
         "calibration_offset": "a speed sweep: a gain grows with speed, an offset does not",

@@ -167,6 +167,7 @@ VANE_OFFSET = Effect(
     ),
     applies=_is_vane,
     update=_offset,
+    exact=True,
     templates=({"offset": 1.0},),
     confusable={
         "frame_error": "sight the vane's mark along the keel; turning the mount",
@@ -263,6 +264,7 @@ QUANTISATION = Effect(
     ),
     applies=_is_vane,
     update=_quantisation,
+    exact=True,
     templates=({"step": 5.0, "origin": 0.0}, {"step": 22.5, "origin": 0.0}),
     confusable={"vane_friction": "strong wind: friction fades, steps stay"},
 )
@@ -309,6 +311,7 @@ SENSOR_SWAP = Effect(
     parameters=(Parameter("reversed", "1", -0.2, 1.2, minimum=0.6, step=1.0, starts=(1.0,)),),
     applies=_is_vane,
     update=_reversed,
+    exact=True,
     templates=({"reversed": 1.0},),
     confusable={"vane_offset": "turn the vane by hand and watch the reading"},
 )

@@ -96,7 +96,7 @@ FLOW_DISTORTION = Effect(
     standing=0.06,
     parameters=(
         *(Parameter(name, "1", -0.3, 0.3, minimum=0.02) for name in _HARMONICS),
-        Parameter("deflection", "1", -0.6, 1.3, healthy=None, step=0.2, starts=(0.0,)),
+        Parameter("deflection", "1", -1.5, 1.5, healthy=None, step=0.2, starts=(0.0,)),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_distortion,
