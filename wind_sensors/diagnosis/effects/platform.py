@@ -23,7 +23,7 @@ DEAD_SHARE = 0.2
 """A log that shows less than this share of what the positions' change shows is dead."""
 
 SECTORS = 8
-FEWEST_SECTORS = 6
+FEWEST_SECTORS = 4
 SHORTEST_VISIT = 0.01
 """A carrier that spends this share of the record in each of so many of these sectors of heading
 shows what its compass does twice a turn."""
