@@ -8,6 +8,7 @@ which nothing in the catalogue describes passes for noise; here it shows.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,7 +99,10 @@ def learnt_levels(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def excess_of(
-    comparison: Comparison, simulated: Simulated, baseline: Baseline
+    comparison: Comparison,
+    simulated: Simulated,
+    baseline: Baseline,
+    exempt: Collection[str] = (),
 ) -> Excess:
     """How far a residual exceeds those of healthy days.
 
@@ -106,9 +110,12 @@ def excess_of(
         comparison: The recording.
         simulated: With everything that is named.
         baseline: What is normal.
+        exempt: Instruments that are not judged.
     """
     worst = Excess()
     for channel in comparison.channels:
+        if channel.instrument in exempt:
+            continue
         known = baseline.channels[channel.name]
         seen, count = levels(comparison, simulated, known, channel)
         above = seen - known.noise_mean

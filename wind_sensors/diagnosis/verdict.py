@@ -129,6 +129,17 @@ def _remainder(
     return left / float(limits[worst]), bank.p_value(left), share
 
 
+def _with_own_noise(naming: Naming) -> set[str]:
+    """Instruments whose named effects leave noise of their own."""
+    comparison = naming.whitener.comparison
+    return {
+        instrument
+        for term in naming.fit.terms
+        if term.effect.noisy
+        for instrument in comparison.affected(comparison.station, term.instrument)
+    }
+
+
 def _patchwork(naming: Naming) -> bool:
     """Whether passing effects were pieced together on one instrument: nothing known fits."""
     passing = [t.instrument for t in naming.fit.terms if t.interval != ALWAYS]
@@ -271,7 +282,7 @@ def diagnose(
     detectable = smallest_detectable(searcher, whitener)
     equal = equal_explanations(naming)
     located_p = bank.p_value(max(f.score for f in before))
-    excess = excess_of(comparison, naming.fit.simulated, baseline)
+    excess = excess_of(comparison, naming.fit.simulated, baseline, _with_own_noise(naming))
     verdict = _verdict(naming, equal, remainder, detectable, located_p, excess)
     calm = is_too_calm(comparison, baseline) and verdict != "none" and (
         not naming.fit.terms or need_calibration(naming.fit.terms)

@@ -59,6 +59,7 @@ MISSED_PULSES = Effect(
     ),
     applies=_is_rotor,
     update=_missed,
+    noisy=True,
     templates=(
         {"dead_time": 0.0, "loss_probability": 0.01},
     ),
@@ -92,6 +93,7 @@ EXTRA_PULSES = Effect(
     ),
     applies=_is_rotor,
     update=_extra,
+    noisy=True,
     templates=({"bounce_probability": 0.01, "bounce_delay": 0.003},),
     confusable={"calibration_drift": "pulse intervals: bounce makes some very short"},
 )

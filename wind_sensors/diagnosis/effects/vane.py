@@ -237,6 +237,7 @@ POTENTIOMETER_GAP = Effect(
     ),
     applies=_is_vane,
     update=_gap,
+    noisy=True,
     templates=tuple(
         {"centre": float(c), "width": 12.0, "reading": 0.0, "form": 0.0}
         for c in range(-180, 180, 10)
@@ -265,6 +266,7 @@ QUANTISATION = Effect(
     applies=_is_vane,
     update=_quantisation,
     exact=True,
+    noisy=True,
     templates=({"step": 5.0, "origin": 0.0}, {"step": 22.5, "origin": 0.0}),
     confusable={"vane_friction": "strong wind: friction fades, steps stay"},
 )
