@@ -91,8 +91,8 @@ class Effect:
             look like that, so a beginning or an end inside the record needs more evidence.
         exact: Its form is certain (geometry, electronics, arithmetic); what others leave beside
             them may be their own form.
-        noisy: What it does is drawn at random or hangs on the last digit, so that its simulation
-            adds noise of its own.
+        noisy: What it does is drawn at random or hangs on the last digit (whether a vane sticks
+            or slips), so that its simulation adds noise of its own.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.

@@ -36,6 +36,7 @@ VANE_FRICTION = Effect(
     ),
     applies=_is_vane,
     update=_friction,
+    noisy=True,
     templates=({"friction_speed": 0.5}, {"friction_speed": 1.2}),
     confusable={
         "stuck_sensor": "turn the vane by hand",
