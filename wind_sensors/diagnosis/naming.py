@@ -42,7 +42,8 @@ BROAD_PARAMETERS = 3
 """From so many fitted parameters on, an explanation with a broad effect is challenged."""
 
 CLEARLY_BETTER = 12.0
-"""Drop of the penalised cost at which two narrow effects take the place of a broad one."""
+"""Drop of the penalised cost at which two narrow effects take the place of a broad one, and which
+an explanation must not miss to compete with another."""
 
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
@@ -116,6 +117,37 @@ def _brings(
     )
     gain = total(before) - total(candidate.fit) - single_event(searcher, before, candidate.fit)
     return min(gain, before_evidence - candidate.evidence)
+
+
+def _leader(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    ranked: Sequence[Judged],
+    needed: float,
+) -> Judged | None:
+    """The explanation that brings most of those that bring enough; None: there is none.
+
+    Only those compete that are not clearly behind in likelihood.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        ranked: Explanations with one more, best first.
+        needed: Gain that the next term has to bring.
+    """
+    so_far = evidence(current, whitener)
+    leader: Judged | None = None
+    most = -np.inf
+    for one in ranked:
+        if leader is not None and one.evidence > leader.evidence + CLEARLY_BETTER:
+            break
+        brings = _brings(searcher, one, current.terms, so_far)
+        least = max(needed, _inexactness(searcher, whitener, current, one.fit.terms[-1]))
+        if brings >= least and brings > most:
+            leader, most = one, brings
+    return leader
 
 
 def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: Term) -> float:
@@ -201,7 +233,6 @@ def _greedy(
     alone: tuple[Term, ...] = ()
     for turn in range(MOST_EFFECTS):
         first = turn == 0
-        fixed = current.terms
         named = None if first else current.simulated
         if named is not None:
             # What is left is judged as what the named effects, in another form, do not explain.
@@ -231,16 +262,7 @@ def _greedy(
                 searcher, passing.whitener, passing.fit.terms[:-1], passing.fit
             )
             ranked[:1] = judged(searcher, [sharper], named)
-        so_far = evidence(current, whitener)
-        leader = next(
-            (
-                r
-                for r in ranked
-                if _brings(searcher, r, fixed, so_far)
-                >= max(needed, _inexactness(searcher, whitener, current, r.fit.terms[-1]))
-            ),
-            None,
-        )
+        leader = _leader(searcher, whitener, current, ranked, needed)
         if leader is None:
             break
         current = leader.fit
