@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing import Pool
 from pathlib import Path
@@ -124,9 +124,11 @@ def _sized(template: Template) -> dict[str, float]:
     return values
 
 
-def own_cases() -> Iterator[Case]:
-    """Every effect on every ready station that can have it."""
+def own_cases(chosen: Sequence[str]) -> Iterator[Case]:
+    """Every effect on every chosen station that can have it."""
     for number, station_name in enumerate(STATIONS):
+        if station_name not in chosen:
+            continue
         station = own_station(station_name)
         seed = 1000 * (number + 1)
         baseline = learn([recorded(station, seed + k) for k in range(HEALTHY)])
@@ -171,8 +173,13 @@ def main() -> None:
     """Print one row per recording, then the counts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, help="development set; none: own simulations")
+    parser.add_argument("--station", action="append", choices=STATIONS, help="none: all")
     arguments = parser.parse_args()
-    cases = folder_cases(arguments.folder) if arguments.folder else own_cases()
+    cases = (
+        folder_cases(arguments.folder)
+        if arguments.folder
+        else own_cases(arguments.station or STATIONS)
+    )
     exact: Counter[str] = Counter()
     counts: Counter[str] = Counter()
     print("| recording | with the whole catalogue | without the true effect |\n|---|---|---|")

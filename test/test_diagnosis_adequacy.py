@@ -6,17 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
-from wind_sensors.diagnosis.fitting import Term, fit
+from wind_sensors.diagnosis.findings import Finding
+from wind_sensors.diagnosis.fitting import Term, fit, planted
+from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.search import searcher_of
-from wind_sensors.diagnosis.verdict import diagnose
-from wind_sensors.diagnosis.whitening import form_signatures, trust_of
+from wind_sensors.diagnosis.verdict import diagnose, made_up
+from wind_sensors.diagnosis.whitening import form_signatures, trust_of, unstanding
 from wind_sensors.errors import UserError
+from wind_sensors.motion import rotations
+from wind_sensors.motion.platform_track import Motion
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.response import ResponseState, respond
 from wind_sensors.station.signals import Angles, Recording
 
@@ -110,3 +117,81 @@ def test_the_noise_that_an_explanation_leaves_counts() -> None:
     ]
     best = judged(searcher, fits, iterations=0)[0]
     assert best.fit.terms[0].values["friction_speed"] == 2.5
+
+
+def _finding(effect: str, share: float, p: float) -> Finding:
+    region = Region("cup/rotor_rate", "all", 0.0, 1.0, "everywhere")
+    proof = Proof(2.0, 1.0, 1.0, 1.0, 0.9, 1.0, None)
+    term = Term(catalogue()[effect], "cup", {})
+    return Finding(term, {}, Found(region, 50.0, 0.1, "m/s"), share, p, (), proof)
+
+
+@pytest.mark.parametrize(
+    ("shares", "ps", "verdict"),
+    [
+        ((0.6, 0.5), (0.002, 0.002), False),
+        ((1.0, 0.9), (0.002, 0.002), True),
+        ((0.6, 0.3), (0.002, 0.4), True),
+        ((1.0,), (0.4,), False),
+    ],
+)
+def test_two_effects_must_stand_out_one_by_one(
+    shares: tuple[float, ...], ps: tuple[float, ...], verdict: bool
+) -> None:
+    effects = ("calibration_offset", "torque_asymmetry")
+    found = tuple(_finding(e, s, p) for e, s, p in zip(effects, shares, ps, strict=False))
+    assert made_up(found) is verdict
+
+
+def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
+    rival = replace(_finding("torque_asymmetry", 0.9, 0.5), proof=None)
+    assert not made_up((_finding("calibration_offset", 0.9, 0.002), rival))
+
+
+def test_a_compass_shows_twice_a_turn_only_where_the_carrier_turns() -> None:
+    effect = catalogue()["heading_deviation"]
+    twice = next(p for p in effect.parameters if p.name == "sine_2")
+    assert twice.free is not None
+    n = 800
+    rest = [np.zeros((n, 3)) for _ in range(3)]
+    for turn, free in ((0.3 * np.pi, False), (2.0 * np.pi, True)):
+        yaw = np.linspace(0.0, turn, n)
+        attitude = rotations.from_roll_pitch_yaw(0.0 * yaw, 0.0 * yaw, yaw)
+        drive = Drive(0, 0.05, np.ones((n, 3)), motion=Motion(attitude, *rest))
+        assert twice.free(drive) is free
+    assert not twice.free(Drive(0, 0.05, np.ones((n, 3))))
+
+
+def test_a_fit_with_derivatives_carried_along_ends_where_an_exact_one_does() -> None:
+    """Against a search that knows no derivatives, on three parameters that act together."""
+    known = baseline()
+    truth = {"sine": 6.0, "cosine": -4.0}
+    effects = catalogue()
+    station = with_effect(STATION, effects["vane_eccentricity"], "vane", truth)
+    station = with_effect(station, effects["low_pass_filter"], "vane", {"time_constant": 0.8})
+    comparison = prepare(recorded(station, 64), known.station)
+    trust = trust_of(comparison, comparison.simulate(station), known)
+    whitener = unstanding(comparison, trust)
+    terms = [
+        Term(effects["vane_eccentricity"], "vane", {"sine": 0.0, "cosine": 0.0}),
+        Term(effects["low_pass_filter"], "vane", {"time_constant": 0.1}),
+    ]
+    found = fit(whitener, known.station, terms, iterations=20)
+
+    def cost(values: np.ndarray) -> float:
+        tried = [
+            replace(terms[0], values={"sine": values[0], "cosine": values[1]}),
+            replace(terms[1], values={"time_constant": values[2]}),
+        ]
+        white = whitener.of_station(planted(known.station, tried))
+        return float(white @ white)
+
+    best = minimize(
+        cost, [5.0, -3.0, 0.6], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}
+    )
+    assert found.cost == pytest.approx(best.fun, abs=0.5)
+    np.testing.assert_allclose(
+        [found.terms[0].values["sine"], found.terms[0].values["cosine"],
+         found.terms[1].values["time_constant"]],
+        best.x, rtol=0.03,
+    )  # fmt: skip

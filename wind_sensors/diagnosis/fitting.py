@@ -23,6 +23,9 @@ _LARGEST_DAMPING = 1e5
 
 _LEAST_INFORMATION = 1e-4
 
+_NEARLY_LINEAR = 0.9
+"""Derivatives are carried along after a step that gained this share of what they promised."""
+
 
 @dataclass(frozen=True)
 class Term:
@@ -198,8 +201,8 @@ def fit(
 ) -> Fit:
     """Fit terms by damped least squares within their bounds.
 
-    Derivatives are taken by differences at the start and where a step with those carried along
-    fails or gains little.
+    Derivatives are taken by differences at the start, and anew after a step that gained less than
+    those carried along promised.
 
     Args:
         whitener: The null of the recording.
@@ -247,7 +250,13 @@ def fit(
             trial_cost, trial_vector, trial_simulated = problem.trial(trial)
             if trial_simulated is not None and trial_cost < cost:
                 gained = cost - trial_cost
-                jacobian = _secant(jacobian, (trial - values) / scale, trial_vector - vector)
+                moved = (trial - values) / scale
+                expected = vector + jacobian @ moved
+                promised = cost - float(expected @ expected)
+                if gained > _NEARLY_LINEAR * promised:
+                    jacobian = _secant(jacobian, moved, trial_vector - vector)
+                else:
+                    jacobian = None
                 values, vector, simulated, cost = (
                     trial, trial_vector, trial_simulated, trial_cost,
                 )  # fmt: skip

@@ -146,7 +146,7 @@ def _patchwork(naming: Naming) -> bool:
     return len(passing) != len(set(passing))
 
 
-def _made_up(findings: tuple[Finding, ...]) -> bool:
+def made_up(findings: tuple[Finding, ...]) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
     One of them stands out nowhere, or they undo each other: each has to make good what the other
@@ -298,7 +298,7 @@ def diagnose(
     if refuted:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
         verdict, findings = "none", ()
-    if _made_up(findings):
+    if made_up(findings):
         verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
