@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import prepare
+from wind_sensors.diagnosis.decision import made_up
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
@@ -18,7 +19,7 @@ from wind_sensors.diagnosis.fitting import Term, fit, planted
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.search import searcher_of
-from wind_sensors.diagnosis.verdict import diagnose, made_up
+from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.diagnosis.whitening import form_signatures, trust_of, unstanding
 from wind_sensors.errors import UserError
 from wind_sensors.motion import rotations

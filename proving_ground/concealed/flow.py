@@ -40,8 +40,8 @@ def wake_shadow(scene: Scene, amount: float, activity: Array) -> Parameters:
 def flow_distortion(scene: Scene, amount: float, activity: Array) -> Parameters:
     """Flow past a mast and its boom: a doublet with the source of the wake it leaves.
 
-    Where the wind comes from an angle a to the axis of either, it is faster by c cos(n a) and turned
-    by -c sin(n a): a flow without vorticity cannot do one without the other.
+    Where the wind comes from an angle a to the axis of either, it is faster by c cos(n a) and
+    turned by -c sin(n a): a flow without vorticity cannot do one without the other.
     """
     toward = float(scene.rng.uniform(-np.pi, np.pi))
     doublet = float(scene.rng.uniform(0.6, 1.0))

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.decision import REMAINDER_SCORES
 from wind_sensors.diagnosis.fitting import ALWAYS, Term
 from wind_sensors.diagnosis.regions import Found
-from wind_sensors.diagnosis.verdict import REMAINDER_SCORES, Diagnosis, diagnose
+from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.diagnosis.watch.believing import Rival, believed
 from wind_sensors.diagnosis.watch.finding import Located
 from wind_sensors.diagnosis.watch.naming import Candidate
