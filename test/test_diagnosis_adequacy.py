@@ -120,33 +120,44 @@ def test_the_noise_that_an_explanation_leaves_counts() -> None:
     assert best.fit.terms[0].values["friction_speed"] == 2.5
 
 
-def _finding(effect: str, share: float, p: float) -> Finding:
+def _finding(effect: str, instrument: str, share: float, p: float) -> Finding:
     region = Region("cup/rotor_rate", "all", 0.0, 1.0, "everywhere")
     proof = Proof(2.0, 1.0, 1.0, 1.0, 0.9, 1.0, None)
-    term = Term(catalogue()[effect], "cup", {})
+    term = Term(catalogue()[effect], instrument, {})
     return Finding(term, {}, Found(region, 50.0, 0.1, "m/s"), share, p, (), proof)
 
 
+OFFSET = ("calibration_offset", "cup")
+ASYMMETRY = ("torque_asymmetry", "cup")
+LATE = ("timestamp_latency", "vane")
+
+
 @pytest.mark.parametrize(
-    ("shares", "ps", "verdict"),
+    ("effects", "shares", "ps", "verdict"),
     [
-        ((0.6, 0.5), (0.002, 0.002), False),
-        ((1.0, 0.9), (0.002, 0.002), True),
-        ((0.6, 0.3), (0.002, 0.4), True),
-        ((1.0,), (0.4,), False),
+        ((OFFSET, ASYMMETRY), (0.6, 0.5), (0.002, 0.002), False),
+        ((OFFSET, ASYMMETRY), (1.0, 0.9), (0.002, 0.002), True),
+        ((OFFSET, LATE), (1.0, 0.9), (0.002, 0.002), False),
+        ((OFFSET, ASYMMETRY), (0.6, 0.3), (0.002, 0.4), True),
+        ((OFFSET, LATE), (0.4, 0.7), (0.002, 0.4), False),
+        ((OFFSET,), (1.0,), (0.4,), False),
     ],
 )
 def test_two_effects_must_stand_out_one_by_one(
-    shares: tuple[float, ...], ps: tuple[float, ...], verdict: bool
+    effects: tuple[tuple[str, str], ...],
+    shares: tuple[float, ...],
+    ps: tuple[float, ...],
+    verdict: bool,
 ) -> None:
-    effects = ("calibration_offset", "torque_asymmetry")
-    found = tuple(_finding(e, s, p) for e, s, p in zip(effects, shares, ps, strict=False))
-    assert made_up(found) is verdict
+    comparison = prepare(recorded(STATION, 65))
+    found = tuple(_finding(*e, s, p) for e, s, p in zip(effects, shares, ps, strict=True))
+    assert made_up(found, comparison) is verdict
 
 
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
-    rival = replace(_finding("torque_asymmetry", 0.9, 0.5), proof=None)
-    assert not made_up((_finding("calibration_offset", 0.9, 0.002), rival))
+    rival = replace(_finding(*ASYMMETRY, 0.9, 0.5), proof=None)
+    found = (_finding(*OFFSET, 0.9, 0.002), rival)
+    assert not made_up(found, prepare(recorded(STATION, 65)))
 
 
 def test_a_compass_shows_twice_a_turn_only_where_the_carrier_turns() -> None:

@@ -44,13 +44,18 @@ what was named."""
 
 REMAINDER_P = 0.05
 
-NOISY = 5.0
+NOISY = 6.0
 VERY_NOISY = 8.0
 """Noise beyond this many standard deviations of healthy days is physics that a name left out;
 without any name, where a reference of another day may err more, beyond the second."""
 
 MOST_SHARED = 1.25
-"""Largest sum of the shares of the misfit that two effects explain in the other's presence."""
+"""Largest sum of the shares of the misfit that two effects on the same signals explain, each in the
+other's presence."""
+
+OWN_SHARE = 0.5
+"""An effect with this share of the misfit stands out without a region of its own: a delay moves
+nothing up or down."""
 
 MOST_FREE_PARAMETERS = 2
 """An explanation with more parameters must also stand out somewhere in the data."""
@@ -117,16 +122,20 @@ def _patchwork(naming: Naming) -> bool:
     return len(passing) != len(set(passing))
 
 
-def made_up(findings: tuple[Finding, ...]) -> bool:
+def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
     One of them stands out nowhere, or they undo each other: each has to make good what the other
-    does.
+    does to the same signals.
     """
     own = [f for f in findings if f.proof is not None]
     if len(own) < 2:
         return False
-    return any(f.p > REMAINDER_P for f in own) or sum(f.share for f in own) > MOST_SHARED
+    if any(f.p > REMAINDER_P and f.share < OWN_SHARE for f in own):
+        return True
+    reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
+    together = bool(set.intersection(*reached))
+    return together and sum(f.share for f in own) > MOST_SHARED
 
 
 def borne_out(findings: tuple[Finding, ...]) -> bool:

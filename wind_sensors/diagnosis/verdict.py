@@ -182,7 +182,7 @@ def diagnose(
     if refuted:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
         verdict, findings = "none", ()
-    if made_up(findings):
+    if made_up(findings, comparison):
         verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
