@@ -135,6 +135,6 @@ def excess_of(
 def described(excess: Excess) -> str:
     """For people."""
     return (
-        f"{excess.channel}: more is left at eddies of {excess.wavelength:.0f} m than on healthy "
-        f"days ({excess.ratio:.1f} times the power), and no known effect takes it away"
+        f"{excess.channel}: what is left at eddies of {excess.wavelength:.0f} m has "
+        f"{excess.ratio:.1f} times the power of a healthy day's, and no known effect takes it away"
     )

@@ -193,7 +193,7 @@ def diagnose(
     if verdict == "unknown" or remainder.p < REMAINDER_P:
         description = _description(after[0])
     if verdict == "unknown" and is_noisy(naming, excess):
-        description = described(excess)
+        description = f"{description}; {described(excess)}"
     if calm:
         description = too_calm(baseline)
     if refuted:

@@ -76,7 +76,8 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 
 def _summary(diagnosis: Diagnosis) -> str:
-    lines = [f"<p class='muted'>{escape(VERDICTS[diagnosis.verdict])}.</p>"]
+    verdict = VERDICTS[diagnosis.verdict]
+    lines = [f"<p class='muted'>{escape(verdict)}.</p>"] if diagnosis.findings else []
     for finding in diagnosis.findings:
         term = finding.term
         text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
@@ -90,7 +91,16 @@ def _summary(diagnosis: Diagnosis) -> str:
             f"{escape(term.effect.meaning)}<br>{escape(text)}{when}.</p>"
         )
     if diagnosis.verdict == "unknown":
-        lines.append(f"<p>{escape(diagnosis.unexplained.description)}</p>")
+        lines.append(f"<p>{escape(diagnosis.unexplained.description)}.</p>")
+        nearest = " and ".join(
+            f"{words(t.effect.name)} ({t.instrument})" for t in diagnosis.naming.fit.terms
+        )
+        if nearest:
+            lines.append(
+                f"<p class='muted'>What comes nearest, {escape(nearest)}, is not borne out: it "
+                "leaves more than a healthy day does, or needs a second effect that does not "
+                "show.</p>"
+            )
     if not diagnosis.calibrated:
         lines.append(
             "<p><b>The null is not calibrated:</b> no healthy recording of this station was "
