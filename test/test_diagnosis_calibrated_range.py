@@ -50,8 +50,8 @@ def test_healthy_recordings_say_what_is_normal_in_their_winds_only() -> None:
         for k, speed in enumerate((2.0, 8.0))
     ]
     calm, windy = (simulate(station(), scenario) for scenario in scenarios)
-    assert 0.5 < learn([calm]).slowest_wind < 2.0
-    assert learn([windy]).slowest_wind == CALIBRATED_FROM
+    assert 0.3 < learn([calm]).slowest_wind < 1.0
+    assert 2.5 < learn([windy]).slowest_wind <= CALIBRATED_FROM
     assert not is_too_calm(prepare(calm), learn([calm, windy]))
     assert is_too_calm(prepare(calm), learn([windy]))
 

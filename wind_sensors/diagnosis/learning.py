@@ -57,6 +57,9 @@ STANDING_MEAN_PRIOR = 0.7
 SELDOM = 0.1
 """Winds below this quantile are too rare in healthy recordings to say what is normal."""
 
+REACH = 0.5
+"""Down to this share of the slowest such wind they say it nevertheless."""
+
 LARGEST_SHARED_BANK = 4
 """Effects with more templates than this have no shared amplitude, only a scatter."""
 
@@ -385,7 +388,7 @@ def learn(
     speeds = np.concatenate([c.speed for c in comparisons])
     return replace(
         baseline,
-        slowest_wind=min(CALIBRATED_FROM, float(np.quantile(speeds, SELDOM))),
+        slowest_wind=min(CALIBRATED_FROM, REACH * float(np.quantile(speeds, SELDOM))),
         loudest_gain=loudest_gain(rows, templates),
         recordings=tuple(r.name for r in recordings),
         means=means,
