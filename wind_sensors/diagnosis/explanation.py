@@ -38,10 +38,10 @@ FURTHER_SHARE = 0.05
 """A further effect on the same signals must also bring this share of the gain so far."""
 
 LARGEST_INEXACTNESS = 500.0
-"""But never more than this,"""
+"""But never more than this."""
 
 LARGEST_EXACT_INEXACTNESS = 150.0
-"""nor than this beside effects whose form is certain."""
+"""The same beside effects whose form is certain."""
 
 EQUAL_SHARE = 0.03
 """Explanations that differ by less than this share of the gain are equal: the simulation is not

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.baseline import WAVENUMBERS, Baseline, ChannelBaseline
 from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.whitening import residual_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -63,11 +64,7 @@ def levels(
     Returns:
         At `WAVENUMBERS`: the logarithms (nan: not seen) and the number of coefficients behind.
     """
-    coherence = comparison.coherence(simulated, channel)
-    slope = spectra.shrinkage(
-        coherence, known.exponent_at(coherence.frequency), comparison.coefficients
-    )
-    residual = comparison.measured.cosine[channel.name] - slope * simulated.cosine[channel.name]
+    coherence, _, residual = residual_of(comparison, simulated, known, channel)
     power = spectra.band_means(residual * residual, coherence.edges)
     ratio = np.log((power[1:] + 1e-12) / (coherence.simulated[1:] + 1e-12))
     count = np.diff(coherence.edges)[1:]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline
 from wind_sensors.diagnosis.comparison import (
     LOW_END,
     Comparison,
@@ -39,16 +39,33 @@ def trust_of(
     return {c.name: _trust(comparison, simulated, baseline, c) for c in comparison.channels}
 
 
-def _trust(
-    comparison: Comparison, simulated: Simulated, baseline: Baseline, channel: Channel
-) -> Trust:
-    name = channel.name
-    known = baseline.channels[name]
+def residual_of(
+    comparison: Comparison, simulated: Simulated, known: ChannelBaseline, channel: Channel
+) -> tuple[spectra.Coherence, FloatArray, FloatArray]:
+    """What a channel shows beyond the share of its simulation that it is expected to show.
+
+    Args:
+        comparison: The recording.
+        simulated: Best simulation.
+        known: Gives that share from the coherence.
+        channel: Of the comparison.
+
+    Returns:
+        Coherence; the share of each cosine coefficient; the residual coefficients.
+    """
     coherence = comparison.coherence(simulated, channel)
     slope = spectra.shrinkage(
         coherence, known.exponent_at(coherence.frequency), comparison.coefficients
     )
-    residual = comparison.measured.cosine[name] - slope * simulated.cosine[name]
+    residual = comparison.measured.cosine[channel.name] - slope * simulated.cosine[channel.name]
+    return coherence, slope, residual
+
+
+def _trust(
+    comparison: Comparison, simulated: Simulated, baseline: Baseline, channel: Channel
+) -> Trust:
+    known = baseline.channels[channel.name]
+    coherence, slope, residual = residual_of(comparison, simulated, known, channel)
     low_end = int(2.0 * comparison.grid.n * comparison.grid.dt * LOW_END)
     variance = spectra.noise_variance(
         residual, known.low_ratio_at(coherence.frequency), low_end
