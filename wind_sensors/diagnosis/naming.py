@@ -139,14 +139,15 @@ def _leader(
     """
     so_far = evidence(current, whitener)
     leader: Judged | None = None
-    most = -np.inf
+    most, likeliest = -np.inf, np.inf
     for one in ranked:
-        if leader is not None and one.evidence > leader.evidence + CLEARLY_BETTER:
+        if one.evidence > likeliest + CLEARLY_BETTER:
             break
         brings = _brings(searcher, one, current.terms, so_far)
         least = max(needed, _inexactness(searcher, whitener, current, one.fit.terms[-1]))
         if brings >= least and brings > most:
             leader, most = one, brings
+            likeliest = min(likeliest, one.evidence)
     return leader
 
 
