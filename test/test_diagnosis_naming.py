@@ -144,6 +144,28 @@ def test_a_beginning_inside_the_record_is_part_of_the_finding() -> None:
     assert end is None
 
 
+def test_a_beginning_and_an_end_of_an_effect_that_depends_on_the_direction() -> None:
+    effect = catalogue()["vane_eccentricity"]
+    station = with_effect(
+        STATION, effect, "vane", {"sine": 6.0, "cosine": 3.0}, (120.0, 290.0)
+    )
+    found = diagnose(recorded(station, 52, swing=1.0), baseline())
+    assert [f.term.key for f in found.findings] == [("vane_eccentricity", "vane")]
+    begin, end = found.findings[0].term.interval
+    assert begin == pytest.approx(120.0, abs=15.0)
+    assert end == pytest.approx(290.0, abs=15.0)
+
+
+def test_a_counter_that_begins_to_lose_what_follows_too_soon() -> None:
+    effect = catalogue()["missed_pulses"]
+    dead = {"dead_time": 0.013, "loss_probability": 0.0}
+    station = with_effect(STATION, effect, "cup", dead, (170.0, None))
+    found = diagnose(recorded(station, 53), baseline())
+    assert [f.term.key for f in found.findings] == [("missed_pulses", "cup")]
+    assert found.findings[0].term.values["dead_time"] == pytest.approx(0.013, rel=0.1)
+    assert found.findings[0].term.interval[0] == pytest.approx(170.0, abs=25.0)
+
+
 def test_the_json_has_the_stated_shape() -> None:
     content = as_json(diagnosed("vane_offset", "vane", offset=6.0))
     assert set(content) >= {

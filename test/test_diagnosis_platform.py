@@ -71,6 +71,20 @@ def test_an_effect_adds_to_what_a_station_already_states() -> None:
     assert found.wake_skew == pytest.approx(0.3)
 
 
+def test_a_log_that_dies_is_found_with_its_end() -> None:
+    known = learn([flown(uav(), seed) for seed in range(3)])
+    flight = flown(uav(), 51)
+    assert flight.platform is not None
+    since = (flight.platform.time - flight.start) * 1e-9
+    velocity = np.where(since[:, None] > 150.0, 0.0, flight.platform.velocity)
+    dead = replace(flight, platform=replace(flight.platform, velocity=velocity))
+    found = diagnose(dead, known)
+    assert [f.term.effect.name for f in found.findings] == ["platform_velocity"]
+    begin, end = found.findings[0].term.interval
+    assert begin == pytest.approx(150.0, abs=10.0)
+    assert end is None
+
+
 def test_a_dead_log_is_found_and_replaced_by_the_positions() -> None:
     known = learn([flown(uav(), seed) for seed in range(3)])
     flight = flown(uav(), 51)

@@ -25,6 +25,9 @@ MAST: dict[str, Case] = {
     "gain": Case(cup={"calibration_gain": 0.93}, speed=0.05),
     "offset": Case(cup={"calibration_offset": -0.4}, speed=0.03),
     "friction": Case(cup={"friction_speed": 1.5}, speed=0.02),
+    "friction that sticks": Case(
+        cup={"friction_speed": 1.5, "friction_breakaway": 2.5}, speed=0.02
+    ),
     "friction in the cold": Case(
         cup={"friction_speed": 1.2, "friction_temperature_coefficient": -0.05},
         scenario={"temperature": -5.0}, speed=0.02,

@@ -347,6 +347,22 @@ def test_thin_air_lets_friction_win_and_changes_nothing_else():
     assert slowed.y[-1] == pytest.approx(expected, rel=1e-6)
 
 
+def test_a_bearing_that_sticks_lets_go_later_than_it_stops():
+    """A wind of 3.8 m/s does not start a rotor that it keeps going; Stribeck's curve by hand."""
+    sticky = cup(starting_speed=0.0, friction_speed=2.0, friction_breakaway=3.0)
+    count = 2400
+    speed = np.repeat((2.5, 3.8, 4.2, 3.8), count)
+    wind = np.stack((speed, 0.0 * speed, 0.0 * speed), axis=1)
+    y = respond(Station(instruments=(sticky,)), Drive(START, 0.05, wind)).rotors["cup"].y
+    stopped, held, started, kept = y[count - 1 :: count]
+    # At rest the air pushes with a4 U^2 = 11.6 against 3 U_s^2 = 12.
+    assert stopped == held == 0.0
+    for turning, blows in ((started, 4.2), (kept, 3.8)):
+        push = (blows - turning) * (0.8 * blows + 0.2 * turning)
+        assert turning > 2.0
+        assert push == pytest.approx(4.0 * (1.0 + 2.0 * np.exp(-(turning**2))), rel=1e-3)
+
+
 def test_a_change_in_the_middle_is_the_healthy_run_and_then_the_changed_one():
     drive = gusty(count=500)
     changed = Station(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparison import BANDS, Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
-from wind_sensors.diagnosis.effects.platform import log_is_dead
-from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.diagnosis.effects.platform import dead_log
+from wind_sensors.diagnosis.fitting import Interval, Term
 from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import BoolArray, erratic
@@ -42,6 +44,12 @@ DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
 other, and nothing shows the way."""
 
+NEAR_AN_END = 20.0
+"""What begins or ends this close to the record's own ends [s] holds all the time."""
+
+DEAD_TIME_CUTS = 30
+"""Places in the record where a counter may begin or cease to lose what follows too soon."""
+
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
 
@@ -55,9 +63,10 @@ def _term(effect: str, instrument: str, **values: float) -> Term:
 def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     """Effects that the raw signals suggest, with starting values, by effect and instrument."""
     out: Guesses = {}
-    if log_is_dead(comparison.drive):
+    silent = dead_log(comparison.drive)
+    if silent is not None:
         still = _term("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
-        out[still.key] = [still]
+        out[still.key] = [replace(still, interval=_holding(comparison, *silent))]
     leans = [
         _term("axis_tilt", STATION, tilt_x=LEAN * np.cos(towards), tilt_y=LEAN * np.sin(towards))
         for towards in np.arange(8) * np.pi / 4.0
@@ -89,6 +98,16 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     return out
 
 
+def _holding(comparison: Comparison, begin: float, end: float) -> Interval:
+    """A stretch [s since the first bin] as an interval of the recording."""
+    since = comparison.drive.elapsed
+    length = comparison.grid.n * comparison.grid.dt
+    return (
+        begin + since if begin > NEAR_AN_END else 0.0,
+        None if end > length - NEAR_AN_END else end + since,
+    )
+
+
 def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
     """Bearings that brake alike at the record's mean temperature and change with it differently."""
     temperature = comparison.drive.temperature
@@ -100,6 +119,7 @@ def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
             "bearing_friction", rotor.name,
             friction_speed=float(np.sqrt(brake * np.exp(-coefficient * away))),
             temperature_coefficient=coefficient,
+            breakaway=1.0,
         )
         for brake in BRAKES
         for coefficient in STIFFENINGS
@@ -123,12 +143,7 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         out.append(
             _term("missed_pulses", rotor.name, dead_time=0.0, loss_probability=min(long, 0.6))
         )
-    shortest = float(np.quantile(interval, 0.001))
-    if np.mean(usual < 0.97 * shortest) > 0.004:
-        out.extend(
-            _term("missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0)
-            for share in (1.0, 0.9)
-        )
+    out.extend(_dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual)))
     if short > 0.004:
         delay = float(np.median(interval[relative < 0.4]))
         out.append(
@@ -152,6 +167,45 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
             )
         )  # fmt: skip
     return out
+
+
+def _dead_times(
+    comparison: Comparison,
+    rotor: Rotor,
+    recorded: tuple[FloatArray, FloatArray],
+    expected: tuple[FloatArray, FloatArray],
+) -> list[Term]:
+    """Dead times without which there would be shorter intervals, all the time or in a part of it.
+
+    Args:
+        comparison: The recording.
+        rotor: Gives the pulses.
+        recorded, expected: End [s since the first bin] and length [s] of each interval.
+    """
+    length = comparison.grid.n * comparison.grid.dt
+    cuts = [length * k / DEAD_TIME_CUTS for k in range(1, DEAD_TIME_CUTS)]
+    spans = [(0.0, length), *((cut, length) for cut in cuts), *((0.0, cut) for cut in cuts)]
+    best: tuple[int, float, Interval] | None = None
+    for begin, end in spans:
+        interval = recorded[1][(recorded[0] >= begin) & (recorded[0] < end)]
+        usual = expected[1][(expected[0] >= begin) & (expected[0] < end)]
+        if interval.size < 100 or usual.size < 100:
+            continue
+        shortest = float(np.quantile(interval, 0.001))
+        missing = int(np.count_nonzero(usual < 0.97 * shortest))
+        # The whole record comes first: a part of it must miss more than all of it does.
+        if missing > 0.004 * usual.size and (best is None or missing > best[0]):
+            best = missing, shortest, _holding(comparison, begin, end)
+    if best is None:
+        return []
+    _, shortest, holds = best
+    return [
+        replace(
+            _term("missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0),
+            interval=holds,
+        )
+        for share in (1.0, 0.9)
+    ]
 
 
 def _silence(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     EQUAL_SHARE,
@@ -30,6 +31,7 @@ from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.screening import screen
 from wind_sensors.diagnosis.search import Searcher
+from wind_sensors.diagnosis.signatures import in_parallel
 from wind_sensors.diagnosis.whitening import Whitener
 
 MOST_EFFECTS = 2
@@ -151,6 +153,20 @@ def _leader(
     return leader
 
 
+def _with_sharp_intervals(
+    searcher: Searcher, ranked: Sequence[Judged], named: Simulated | None
+) -> list[Judged]:
+    """The same explanations with beginnings and ends where they fit best; best first."""
+
+    def sharper(one: Judged) -> Fit:
+        return refined_interval(searcher, one.whitener, one.fit.terms[:-1], one.fit)
+
+    passing = [r for r in ranked if r.fit.terms[-1].interval != ALWAYS]
+    lasting = [r for r in ranked if r.fit.terms[-1].interval == ALWAYS]
+    sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
+    return sorted([*lasting, *sharp], key=lambda r: r.evidence)
+
+
 def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: Term) -> float:
     """What a further term must exceed if it acts on signals that the terms so far change."""
     reached = {
@@ -257,12 +273,7 @@ def _greedy(
         ranked = judged(searcher, pool, named)
         ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
         ranked = [r for r in ranked if plausible(r.fit)]
-        if ranked and ranked[0].fit.terms[-1].interval != ALWAYS:
-            passing = ranked[0]
-            sharper = refined_interval(
-                searcher, passing.whitener, passing.fit.terms[:-1], passing.fit
-            )
-            ranked[:1] = judged(searcher, [sharper], named)
+        ranked = _with_sharp_intervals(searcher, ranked, named)
         leader = _leader(searcher, whitener, current, ranked, needed)
         if leader is None:
             break

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import plausible, seen_in, total
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit, planted
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit, planted
+from wind_sensors.diagnosis.intervals import IntervalGains, cell_signatures, interval_gains
 from wind_sensors.diagnosis.screening import (
+    JOINT_TEMPLATES,
+    Score,
     group_templates,
     screen,
-    screen_windows,
-    windowed_signature,
-    windows,
+    starting_values,
 )
 from wind_sensors.diagnosis.search import PENALTY_PER_INTERVAL, Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
+
+WINDOW_STEP = 30.0
+"""Onsets and endings are screened every so many seconds."""
+
+SHORTEST_WINDOW = 60.0
+"""What lasts less [s] tells an effect badly from a gust."""
 
 NEAR_AN_END = 8.0
 """A beginning or an end this close to the record's own [s] is none."""
@@ -28,96 +36,213 @@ NEAR_AN_END = 8.0
 WINDOW_CANDIDATES = 4
 WINDOW_ADVANTAGE = 15.0
 SMOOTHING_WINDOW_ADVANTAGE = 120.0
-LEAST_WINDOW_GAIN = 4.0
+LEAST_WINDOW_GAIN = 24.0
+"""What an effect must promise in a part of the record to be fitted there."""
 
 ONSET_GAIN = 25.0
 """What a beginning or an end of a named effect must bring beyond its cost."""
+
+REFINING_STEPS = (15.0, 4.0, 1.0)
+"""Distances [s] between the beginnings and ends that are tried around the best so far."""
+
+REFINING_REACH = 8
+"""So many of them on either side."""
+
+
+@dataclass(frozen=True)
+class _Span:
+    """The interval in which an effect gains most beyond the cost of its beginning and end.
+
+    Attributes:
+        gain: Linear, without the cost.
+        net: With it.
+        window: [s since the first bin].
+        amplitudes: Of its templates.
+    """
+
+    gain: float
+    net: float
+    window: tuple[float, float]
+    amplitudes: FloatArray
+
+
+def _best_span(found: IntervalGains, shortest: float) -> _Span | None:
+    """The best interval that is not the whole record; None: there is none."""
+    cuts = found.cuts
+    last = cuts.size - 1
+    place = np.arange(cuts.size)
+    edges = (place[:, None] > 0).astype(int) + (place[None, :] < last)
+    long_enough = cuts[None, :] - cuts[:, None] >= shortest
+    long_enough |= (edges == 1) & (cuts[None, :] - cuts[:, None] > 0.5 * shortest)
+    net = np.where((edges > 0) & long_enough, found.gains - PENALTY_PER_INTERVAL * edges, -np.inf)
+    begin, end = np.unravel_index(int(np.argmax(net)), net.shape)
+    if not np.isfinite(net[begin, end]):
+        return None
+    return _Span(
+        float(found.gains[begin, end]), float(net[begin, end]),
+        (float(cuts[begin]), float(cuts[end])), found.amplitudes[begin, end],
+    )  # fmt: skip
+
+
+def _screening_cuts(searcher: Searcher) -> FloatArray:
+    length = searcher.comparison.grid.n * searcher.comparison.grid.dt
+    return np.append(np.arange(0.0, length - 0.5 * WINDOW_STEP, WINDOW_STEP), length)
+
+
+def _since_start(searcher: Searcher, window: tuple[float, float]) -> Interval:
+    """A window [s since the first bin] as an interval of the recording."""
+    since = searcher.comparison.drive.elapsed
+    length = searcher.comparison.grid.n * searcher.comparison.grid.dt
+    begin, end = window
+    return (
+        begin + since if begin > NEAR_AN_END else 0.0,
+        None if end > length - NEAR_AN_END else end + since,
+    )
 
 
 def window_starts(
     searcher: Searcher, whitener: Whitener, vector: FloatArray, used: set[tuple[str, str]]
 ) -> list[list[Term]]:
-    """Effects that explain clearly more when they hold in a part of the record only."""
-    signatures = searcher.white_signatures(whitener)
-    groups = group_templates(searcher.bank.templates)
-    power = np.einsum("ij,ij->i", signatures, signatures)
-    ranked = []
-    length = searcher.comparison.grid.n * searcher.comparison.grid.dt
-    since = searcher.comparison.drive.elapsed
-    scores = screen(searcher.bank.templates, signatures, vector)
+    """Effects that explain clearly more when they hold in a part of the record only.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        vector: White vector of what is to be explained.
+        used: Effects and instruments that are named already.
+
+    Returns:
+        Starting points of the most promising, several for each.
+    """
+    bank = searcher.bank
+    always = {
+        (s.effect, s.instrument): s.gain
+        for s in screen(bank.templates, searcher.white_signatures(whitener), vector)
+    }
+    cuts = _screening_cuts(searcher)
     found: list[tuple[float, list[Term]]] = []
-    for score in scores[: 2 * WINDOW_CANDIDATES]:
-        key = (score.effect, score.instrument)
-        if key in used or score.effect == "stuck_sensor" or score.gain < LEAST_WINDOW_GAIN:
+    for key, members in group_templates(bank.templates).items():
+        effect = searcher.effects[key[0]]
+        if key in used or effect.name == "stuck_sensor":
             continue
-        members = groups[key]
-        strong = sorted(
-            (k for k in members if power[k] > 1e-2),
-            key=lambda k: -((signatures[k] @ vector) ** 2 / power[k]),
-        )[:2]
-        if not strong:
+        cells = [
+            whitener.through_standing(
+                cell_signatures(
+                    searcher.comparison, bank.without, bank.with_each[k], whitener.trust, cuts
+                )
+            )
+            for k in members
+        ]
+        joint = len(members) <= JOINT_TEMPLATES
+        span = _best_span(interval_gains(cuts, cells, vector, joint), SHORTEST_WINDOW)
+        advantage = SMOOTHING_WINDOW_ADVANTAGE if effect.smooths else WINDOW_ADVANTAGE
+        if span is None or span.gain < max(
+            always.get(key, 0.0) + advantage, LEAST_WINDOW_GAIN
+        ):
             continue
-        gain, window, amplitude, which = screen_windows(
-            whitener, searcher.bank, strong, vector
+        amplitudes = {
+            bank.templates[k].number: float(a)
+            for k, a in zip(members, span.amplitudes, strict=True) if a != 0.0
+        }  # fmt: skip
+        template = bank.templates[members[int(np.argmax(np.abs(span.amplitudes)))]]
+        score = Score(
+            *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)
         )
-        advantage = (
-            SMOOTHING_WINDOW_ADVANTAGE
-            if searcher.effects[score.effect].smooths
-            else WINDOW_ADVANTAGE
-        )
-        if window is None or gain < score.gain + advantage:
-            continue
-        template = searcher.bank.templates[which]
-        values = dict(template.values)
-        for p in template.effect.parameters:
-            if p.healthy is not None:
-                moved = p.healthy + amplitude * (values[p.name] - p.healthy)
-                values[p.name] = float(np.clip(moved, p.low, p.high))
-        interval = (
-            window[0] + since if window[0] > 0.0 else 0.0,
-            None if window[1] >= length else window[1] + since,
-        )
-        starts = [Term(template.effect, score.instrument, values, interval)]
+        interval = _since_start(searcher, span.window)
+        starts = [Term(effect, key[1], starting_values(score), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
-        found.append((gain, starts))
+        found.append((span.net, starts))
     ranked = sorted(found, key=lambda pair: -pair[0])
     return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
+
+
+def _around(edge: float, step: float, low: float, high: float) -> FloatArray:
+    """Places around an edge, none near the ends of the record."""
+    places = edge + step * np.arange(-REFINING_REACH, REFINING_REACH + 1)
+    return np.asarray(places[(places > low + NEAR_AN_END) & (places < high - NEAR_AN_END)])
 
 
 def refined_interval(
     searcher: Searcher, whitener: Whitener, fixed: Sequence[Term], candidate: Fit
 ) -> Fit:
-    """The fit with its last term's beginning and end moved to where they fit best."""
-    best = candidate
+    """The fit with its last term's beginning and end where they fit best.
+
+    First a coarse search that may also give it an end, or a beginning, that it did not have; then
+    finer ones around what it has.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        fixed: The terms before the last.
+        candidate: The fit.
+    """
     comparison = searcher.comparison
-    length = comparison.grid.n * comparison.grid.dt + comparison.drive.elapsed
-    for step in (15.0, 5.0, 2.0):
-        for side in (0, 1):
-            for direction in (-1.0, 1.0):
-                for _ in range(3):
-                    term = best.terms[-1]
-                    start, stop = term.interval
-                    if side == 0 and start > 0.0:
-                        interval = (max(start + direction * step, 0.1), stop)
-                    elif side == 1 and stop is not None:
-                        interval = (start, stop + direction * step)
-                    else:
-                        break
-                    if interval[0] < NEAR_AN_END:
-                        interval = (0.0, interval[1])
-                    if interval[1] is not None and interval[1] > length - NEAR_AN_END:
-                        interval = (interval[0], None)
-                    if interval[1] is not None and interval[1] - interval[0] < 5.0:
-                        break
-                    moved = replace(term, interval=interval)
-                    trial = fit(
-                        whitener, searcher.station, [*fixed, moved],
-                        searcher.bank.without, iterations=1,
-                    )  # fmt: skip
-                    if trial.cost >= best.cost - 0.5:
-                        break
-                    best = trial
+    without = comparison.simulate(planted(searcher.station, fixed))
+    best = candidate
+    always: Simulated | None = None
+    for step in (WINDOW_STEP, *REFINING_STEPS):
+        if always is None:
+            endless = replace(best.terms[-1], interval=ALWAYS)
+            always = comparison.simulate(planted(searcher.station, [*fixed, endless]))
+        window = _best_window(
+            searcher, whitener, (without, always), best.terms[-1].interval, step
+        )
+        if window is None:
+            break
+        interval = _since_start(searcher, window)
+        if interval in (best.terms[-1].interval, ALWAYS):
+            continue
+        moved = replace(best.terms[-1], interval=interval)
+        trial = fit(
+            whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2
+        )
+        if total(trial) < total(best):
+            best, always = trial, None
     return best
+
+
+def _best_window(
+    searcher: Searcher,
+    whitener: Whitener,
+    simulated: tuple[Simulated, Simulated],
+    interval: Interval,
+    step: float,
+) -> tuple[float, float] | None:
+    """Where an effect gains most [s since the first bin]; None: there is no room to search.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        simulated: Without the effect, and with it all the time.
+        interval: Where it holds so far.
+        step: Distance of beginnings and ends [s]; at `WINDOW_STEP` anywhere in the record, below
+            around what there is.
+    """
+    comparison = searcher.comparison
+    without, always = simulated
+    since = comparison.drive.elapsed
+    length = comparison.grid.n * comparison.grid.dt
+    begin, end = interval
+    if step == WINDOW_STEP:
+        first = last = _screening_cuts(searcher)
+    else:
+        first = np.zeros(1) if begin <= 0.0 else _around(begin - since, step, 0.0, length)
+        last = np.array([length]) if end is None else _around(end - since, step, 0.0, length)
+    cuts = np.unique(np.concatenate(([0.0], first, last, [length])))
+    cells = cell_signatures(comparison, without, always, whitener.trust, cuts)
+    gains = interval_gains(
+        cuts, [whitener.through_standing(cells)], whitener.of(without), joint=False
+    )
+    if step == WINDOW_STEP:
+        span = _best_span(gains, SHORTEST_WINDOW)
+        return None if span is None else span.window
+    allowed = np.isin(cuts, first)[:, None] & np.isin(cuts, last)[None, :]
+    allowed &= cuts[None, :] - cuts[:, None] > 0.5 * step
+    if not allowed.any():
+        return None
+    net = np.where(allowed, gains.gains, -np.inf)
+    i, j = np.unravel_index(int(np.argmax(net)), net.shape)
+    return float(cuts[i]), float(cuts[j])
 
 
 def with_interval(searcher: Searcher, current: Fit) -> Fit:
@@ -127,41 +252,21 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
     wrong form does not pass for an interval.
     """
     comparison = searcher.comparison
-    since = comparison.drive.elapsed
-    length = comparison.grid.n * comparison.grid.dt
-    at = comparison.grid.centres
-    for k, term in enumerate(current.terms):
+    for term in current.terms:
         if term.interval != ALWAYS or term.effect.name == "stuck_sensor":
             continue
         whitener = searcher.whitener(current.simulated, current.simulated)
         known = seen_in(whitener, current)
-        others = [t for j, t in enumerate(current.terms) if j != k]
+        others = [t for t in current.terms if t.key != term.key]
         without = comparison.simulate(planted(searcher.station, others))
         start = whitener.of(without)
-        spans = windows(comparison)
-        rows = whitener.through_standing(
-            np.array(
-                [
-                    windowed_signature(
-                        comparison, without, current.simulated, whitener.trust,
-                        (at >= begin) & (at < end),
-                    )
-                    for begin, end in spans
-                ]
-            )
-        )  # fmt: skip
-        power = np.maximum(np.einsum("ij,ij->i", rows, rows), 1e-2)
-        left = float(start @ start) - (rows @ start) ** 2 / power
-        best = int(np.argmin(left))
-        begin, end = spans[best]
-        interval = (
-            begin + since if begin > 0.0 else 0.0,
-            None if end >= length else end + since,
-        )
-        edges = (interval[0] > 0.0) + (interval[1] is not None)
-        if known.cost - left[best] < ONSET_GAIN + PENALTY_PER_INTERVAL * edges:
+        cuts = _screening_cuts(searcher)
+        cells = cell_signatures(comparison, without, current.simulated, whitener.trust, cuts)
+        gains = interval_gains(cuts, [whitener.through_standing(cells)], start, joint=False)
+        span = _best_span(gains, SHORTEST_WINDOW)
+        if span is None or known.cost - (float(start @ start) - span.net) < ONSET_GAIN:
             continue
-        passing = replace(term, interval=interval)
+        passing = replace(term, interval=_since_start(searcher, span.window))
         trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
         trial = refined_interval(searcher, whitener, trial.terms[:-1], trial)
         always = fit(whitener, searcher.station, current.terms, searcher.bank.without)

@@ -14,6 +14,7 @@ from wind_sensors.diagnosis.effects.definition import STATION, Effect
 from wind_sensors.diagnosis.fitting import Fit, Term, fit, planted
 from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.screening import (
+    JOINT_TEMPLATES,
     group_templates,
     screen,
     starting_values,
@@ -197,7 +198,7 @@ class Searcher:
             power = np.einsum("ij,ij->i", signatures[members], signatures[members])
             seen = signatures[members] @ vector
             gains = seen**2 / np.maximum(power, 1e-9)
-            if len(members) > 4:
+            if len(members) > JOINT_TEMPLATES:
                 order = np.argsort(-gains)[:3]
                 for k in order[1:]:
                     template = self.bank.templates[members[int(k)]]

@@ -120,7 +120,7 @@ def instruments_of(station: Station) -> Instruments:
         plain[k] = int(
             not instrument.wake_shadows and not np.any(distortion[k]) and tilt == (0.0, 0.0)
         )
-    rotor_rows = np.zeros((len(rotors), 15))
+    rotor_rows = np.zeros((len(rotors), 16))
     tables = np.ones((len(rotors), 181))
     mounting = np.zeros((len(rotors), 7))
     for k, rotor in enumerate(rotors):

@@ -53,7 +53,7 @@ class Instruments(NamedTuple):
     """Constants of all rotors and vanes of a station as arrays.
 
     Attributes:
-        rotor: `RotorParameters` without the table, shape (rotors, 15).
+        rotor: `RotorParameters` without the table, shape (rotors, 16).
         response: Angular response tables, shape (rotors, 181).
         mounting: Kind, index of the carrying vane, arm [m], axis x, y, z, reference density
             [kg/m^3]; shape (rotors, 7).
@@ -86,7 +86,7 @@ def rotor_of(s: Instruments, i: int) -> RotorParameters:
     r = s.rotor[i]
     return RotorParameters(
         int(r[0]), r[1], r[2], r[3], r[4], r[5], r[6], s.response[i], r[7], r[8], r[9], r[10],
-        r[11], r[12], r[13], r[14],
+        r[11], r[12], r[13], r[14], r[15],
     )  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from wind_sensors.instruments.dynamics.rotor import (
     PROPELLER_JACKSON,
     PROPELLER_KRISTENSEN_1994,
     RotorParameters,
+    bearing_friction,
     table_at,
     torque_slope_ratio,
 )
@@ -151,9 +152,7 @@ def forcing_from_motion(
         density_ratio: Air density relative to the calibration's.
         temperature: [deg C].
     """
-    friction = p.friction * math.exp(
-        p.friction_temperature_coefficient * (temperature - p.reference_temperature)
-    )
+    friction = bearing_friction(p, y, temperature)
     push = (p.distance_constant * p.inertia_factor * y_rate + friction) / density_ratio
     if p.form == PROPELLER_JACKSON:
         f = max(table_at(p.angular_response, angle), 0.2)

@@ -80,6 +80,7 @@ def rotor(
         inertia_factor=1.0,
         torque_harmonic=0.0,
         torque_harmonic_phase=0.0,
+        breakaway=1.0,
     )
 
 

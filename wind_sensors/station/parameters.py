@@ -76,6 +76,7 @@ def rotor_parameters(rotor: Cup | Propeller) -> RotorParameters:
         inertia_factor=rotor.inertia_factor,
         torque_harmonic=rotor.torque_harmonic,
         torque_harmonic_phase=float(np.radians(rotor.torque_harmonic_phase_deg)),
+        breakaway=rotor.friction_breakaway,
     )
 
 

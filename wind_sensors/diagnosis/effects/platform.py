@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
 from wind_sensors.motion.frames import heading_of
@@ -22,6 +23,15 @@ Entry = Instrument | Platform
 DEAD_SHARE = 0.2
 """A log that shows less than this share of what the positions' change shows is dead."""
 
+DEAD_AVERAGE = 10.0
+"""Time [s] over which the two are compared."""
+
+LEAST_TRAVEL = 0.5
+"""Speed [m/s] below which a carrier may well stand still."""
+
+DEAD_SHORTEST = 60.0
+"""A log that is silent for less [s] is not held to be dead."""
+
 SECTORS = 8
 FEWEST_SECTORS = 4
 SHORTEST_VISIT = 0.01
@@ -33,12 +43,33 @@ def _is_platform(entry: Entry, station: Station) -> bool:
     return isinstance(entry, Platform)
 
 
-def log_is_dead(drive: Drive) -> bool:
-    """Whether the positions move and the reported velocity does not."""
+def dead_log(drive: Drive) -> tuple[float, float] | None:
+    """Where the positions move and the reported velocity does not, for the longest time.
+
+    Returns:
+        Begin and end [s since the drive's first instant]; None: nowhere.
+    """
     motion = drive.motion
     if motion is None or motion.travel is None:
-        return False
-    return bool(np.std(motion.velocity) < DEAD_SHARE * np.std(motion.travel))
+        return None
+    wide = max(1, int(DEAD_AVERAGE / drive.dt))
+    reported, moved = (
+        np.sqrt(np.maximum(uniform_filter1d(np.sum(v * v, axis=1), wide, mode="nearest"), 0.0))
+        for v in (motion.velocity, motion.travel)
+    )
+    dead = (moved > LEAST_TRAVEL) & (reported < DEAD_SHARE * moved)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], dead, [False])).astype(int)))
+    if edges.size == 0:
+        return None
+    begins, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - begins))
+    begin, end = float(begins[longest] * drive.dt), float(ends[longest] * drive.dt)
+    return (begin, end) if end - begin > DEAD_SHORTEST else None
+
+
+def log_is_dead(drive: Drive) -> bool:
+    """Whether the positions move somewhere and the reported velocity does not."""
+    return dead_log(drive) is not None
 
 
 def _share(entry: Entry, values: Values) -> dict[str, Any]:

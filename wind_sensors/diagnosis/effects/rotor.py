@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Angle, Cup, Instrument, Platform, Propeller, Rotor, Station
 
 Entry = Instrument | Platform
@@ -73,11 +76,24 @@ CALIBRATION_OFFSET = Effect(
 )
 
 
+LULL = 4.0
+"""Wind speed [m/s] below which a braked rotor may come to rest."""
+
+LULLS = 0.02
+"""Share of the record that a rotor must spend there to show when it lets go."""
+
+
+def _lulls(drive: Drive) -> bool:
+    speed = np.hypot(drive.wind[:, 0], drive.wind[:, 1])
+    return bool(np.mean(speed < LULL) > LULLS)
+
+
 def _friction(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
     return {
         "friction_speed": (entry.friction_speed**2 + values["friction_speed"] ** 2) ** 0.5,
         "friction_temperature_coefficient": values["temperature_coefficient"],
+        "friction_breakaway": values.get("breakaway", 1.0),
     }
 
 
@@ -86,7 +102,7 @@ BEARING_FRICTION = Effect(
     meaning="The bearing brakes the rotor with a torque that does not depend on the wind.",
     entrance="response",
     equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 exp(c (T - T0)); "
-    "steady y = U - U_s^2/U",
+    "steady y = U - U_s^2/U; at rest it holds `breakaway` times as much",
     source="J80, eqs. (5), (6)",
     region="low speeds; the rotor stalls below U_s",
     occasional=True,
@@ -98,10 +114,13 @@ BEARING_FRICTION = Effect(
             "temperature_coefficient", "1/K", -0.4, 0.05, step=0.005, swing=3.0,
             starts=(-0.05, -0.12),
         ),
+        Parameter(
+            "breakaway", "1", 1.0, 5.0, healthy=1.0, step=0.1, starts=(2.0, 3.2), free=_lulls
+        ),
     ),
     applies=_is_rotor,
     update=_friction,
-    templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0},),
+    templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0, "breakaway": 1.0},),
     confusable={
         "calibration_offset": "a speed sweep: friction fades as 1/U, an offset stays",
         "calibration_drift": "a speed sweep",

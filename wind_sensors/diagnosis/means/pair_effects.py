@@ -30,9 +30,9 @@ FEWEST_KNOWN = 0.9
 _NOT_SEEN = {
     "angular_response": ("skewness",),
     "flow_distortion": ("deflection",),
-    FRICTION: ("temperature_coefficient",),
+    FRICTION: ("temperature_coefficient", "breakaway"),
 }
-_AT_REST = {"skewness": 0.0, "deflection": 0.0, "temperature_coefficient": 0.0}
+_AT_REST = {"skewness": 0.0, "deflection": 0.0, "temperature_coefficient": 0.0, "breakaway": 1.0}
 
 
 def rotor_effects() -> dict[str, Effect]:
@@ -80,7 +80,10 @@ def warming(temperature: npt.NDArray[np.float64]) -> Effect | None:
     if known.size < FEWEST_KNOWN * temperature.size or known.size == 0:
         return None
     swing = float(np.subtract(*np.quantile(known, (0.95, 0.05))))
-    return replace(effect, everywhere=False) if swing >= needed else None
+    if swing < needed:
+        return None
+    seen = tuple(p for p in effect.parameters if p.name != "breakaway")
+    return replace(effect, everywhere=False, parameters=seen)
 
 
 def _physical(parameter: Parameter) -> Parameter:

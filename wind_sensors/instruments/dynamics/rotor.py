@@ -74,6 +74,8 @@ class RotorParameters(NamedTuple):
     """Once-per-revolution torque e relative to the dynamic pressure (0 = healthy)."""
     torque_harmonic_phase: float
     """Rotor angle of the strong side [rad]."""
+    breakaway: float
+    """Friction at rest relative to that of the turning rotor, 1 or more (1 = healthy)."""
 
 
 @compiled
@@ -150,6 +152,26 @@ def rotor_forcing(
     return forcing, (forcing if slope_is_forcing else slope), lift
 
 
+STRIBECK_SPEED = 1.0
+"""Rate l S [m/s] at which the friction of a bearing that sticks has come down most of the way from
+that at rest."""
+
+
+@compiled
+def bearing_friction(p: RotorParameters, y: float, temperature: float) -> float:
+    """Magnitude of the bearing's friction F [m^2/s^2] at a rate y = l s [m/s].
+
+    It stiffens with cold, and falls from `breakaway` times its size at rest (Stribeck's curve).
+    """
+    friction = p.friction * math.exp(
+        p.friction_temperature_coefficient * (temperature - p.reference_temperature)
+    )
+    if p.breakaway == 1.0:
+        return friction
+    slow = math.exp(-(y / STRIBECK_SPEED) * (y / STRIBECK_SPEED))
+    return friction * (1.0 + (p.breakaway - 1.0) * slow)
+
+
 @compiled
 def rotor_acceleration(
     p: RotorParameters,
@@ -175,9 +197,7 @@ def rotor_acceleration(
             * math.cos(psi - lateral_angle - p.torque_harmonic_phase)
         )
     torque *= density_ratio
-    friction = p.friction * math.exp(
-        p.friction_temperature_coefficient * (temperature - p.reference_temperature)
-    )
+    friction = bearing_friction(p, y, temperature)
     if y > 0.0:
         torque -= friction
     elif y < 0.0:
