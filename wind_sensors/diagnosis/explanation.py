@@ -191,8 +191,9 @@ def judged(
     def one(candidate: Fit) -> tuple[Fit, float]:
         whitener = searcher.whitener(candidate.simulated, named)
         again = fit(
-            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations
-        )
+            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations,
+            candidate,
+        )  # fmt: skip
         whitener = searcher.whitener(again.simulated, named)
         again = seen_in(whitener, again)
         return again, evidence(again, whitener)

@@ -100,7 +100,7 @@ def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
 
 
 def _brings(
-    searcher: Searcher, candidate: Judged, fixed: Sequence[Term], before_evidence: float
+    searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float
 ) -> float:
     """What a candidate gains over the terms before: in its own null and in likelihood, the less.
 
@@ -111,8 +111,8 @@ def _brings(
         return -np.inf
     whitener = candidate.whitener
     before = (
-        fit(whitener, searcher.station, fixed, searcher.bank.without)
-        if fixed
+        fit(whitener, searcher.station, current.terms, searcher.bank.without, known=current)
+        if current.terms
         else no_terms(whitener, searcher)
     )
     gain = total(before) - total(candidate.fit) - single_event(searcher, before, candidate.fit)
@@ -143,7 +143,7 @@ def _leader(
     for one in ranked:
         if one.evidence > likeliest + CLEARLY_BETTER:
             break
-        brings = _brings(searcher, one, current.terms, so_far)
+        brings = _brings(searcher, one, current, so_far)
         least = max(needed, _inexactness(searcher, whitener, current, one.fit.terms[-1]))
         if brings >= least and brings > most:
             leader, most = one, brings
@@ -259,9 +259,7 @@ def _greedy(
         ranked = [r for r in ranked if plausible(r.fit)]
         if ranked and ranked[0].fit.terms[-1].interval != ALWAYS:
             passing = ranked[0]
-            sharper = refined_interval(
-                searcher, passing.whitener, passing.fit.terms[:-1], passing.fit
-            )
+            sharper = refined_interval(searcher, passing.whitener, passing.fit)
             ranked[:1] = judged(searcher, [sharper], named)
         leader = _leader(searcher, whitener, current, ranked, needed)
         if leader is None:
@@ -275,7 +273,9 @@ def _greedy(
         alternatives = (*alternatives, *losers) if not first else losers
     whitener = searcher.whitener(current.simulated)
     if current.terms:
-        current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
+        current = fit(
+            whitener, searcher.station, current.terms, searcher.bank.without, known=current
+        )
     else:
         current = seen_in(whitener, current)
     if len(current.terms) > 1:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.explanation import plausible, seen_in, total
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit, planted
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit, planted
 from wind_sensors.diagnosis.screening import (
     group_templates,
     screen,
@@ -29,6 +28,21 @@ WINDOW_CANDIDATES = 4
 WINDOW_ADVANTAGE = 15.0
 SMOOTHING_WINDOW_ADVANTAGE = 120.0
 LEAST_WINDOW_GAIN = 4.0
+
+REFINED_BY = ((60.0, 5.0), (4.0, 1.0))
+"""How far beginnings and ends are moved each way, and in which steps [s]."""
+
+REFINEMENTS = 3
+"""Largest number of times that an interval is moved and its effect fitted again."""
+
+LEAST_REFINEMENT = 0.5
+"""What a moved interval must bring."""
+
+SIZE_CHANGE = (0.5, 2.0)
+"""Factors by which an effect's size may change when its interval does."""
+
+SHORTEST_INTERVAL = 5.0
+"""[s]"""
 
 ONSET_GAIN = 25.0
 """What a beginning or an end of a named effect must bring beyond its cost."""
@@ -84,40 +98,84 @@ def window_starts(
     return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
 
 
-def refined_interval(
-    searcher: Searcher, whitener: Whitener, fixed: Sequence[Term], candidate: Fit
-) -> Fit:
+def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
     """The fit with its last term's beginning and end moved to where they fit best."""
     best = candidate
-    comparison = searcher.comparison
-    length = comparison.grid.n * comparison.grid.dt + comparison.drive.elapsed
-    for step in (15.0, 5.0, 2.0):
-        for side in (0, 1):
-            for direction in (-1.0, 1.0):
-                for _ in range(3):
-                    term = best.terms[-1]
-                    start, stop = term.interval
-                    if side == 0 and start > 0.0:
-                        interval = (max(start + direction * step, 0.1), stop)
-                    elif side == 1 and stop is not None:
-                        interval = (start, stop + direction * step)
-                    else:
-                        break
-                    if interval[0] < NEAR_AN_END:
-                        interval = (0.0, interval[1])
-                    if interval[1] is not None and interval[1] > length - NEAR_AN_END:
-                        interval = (interval[0], None)
-                    if interval[1] is not None and interval[1] - interval[0] < 5.0:
-                        break
-                    moved = replace(term, interval=interval)
-                    trial = fit(
-                        whitener, searcher.station, [*fixed, moved],
-                        searcher.bank.without, iterations=1,
-                    )  # fmt: skip
-                    if trial.cost >= best.cost - 0.5:
-                        break
-                    best = trial
+    for _ in range(REFINEMENTS):
+        interval = _sharpest(searcher, whitener, best)
+        if interval == best.terms[-1].interval:
+            break
+        moved = replace(best.terms[-1], interval=interval)
+        trial = fit(
+            whitener, searcher.station, [*best.terms[:-1], moved], searcher.bank.without,
+            iterations=3, known=best,
+        )  # fmt: skip
+        if trial.cost >= best.cost - LEAST_REFINEMENT:
+            break
+        best = trial
     return best
+
+
+def _sharpest(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Interval:
+    """The last term's interval with its beginning and end where they explain most.
+
+    Judged without further simulations: the signals follow the station with the effect inside the
+    interval and the one without it outside, but for the seconds that an instrument takes to
+    settle.
+    """
+    comparison = searcher.comparison
+    *others, passing = candidate.terms
+    without, always = (
+        comparison.simulate(planted(searcher.station, terms))
+        for terms in (others, [*others, replace(passing, interval=ALWAYS)])
+    )
+    start = whitener.of(without)
+    at = comparison.grid.centres + comparison.drive.elapsed
+    length = comparison.grid.n * comparison.grid.dt + comparison.drive.elapsed
+
+    def left(interval: Interval) -> float:
+        begin, end = interval[0], length if interval[1] is None else interval[1]
+        inside = (at >= begin) & (at < end)
+        row = whitener.through_standing(
+            windowed_signature(comparison, without, always, whitener.trust, inside)
+        )
+        power = max(float(row @ row), 1e-2)
+        amplitude = float(np.clip(row @ start / power, *SIZE_CHANGE))
+        rest = start - amplitude * row
+        return float(rest @ rest)
+
+    best = passing.interval
+    least = left(best)
+    for reach, step in REFINED_BY:
+        for side in (0, 1):
+            middle = best
+            for shift in np.arange(-reach, reach + step, step):
+                trial = _moved(middle, side, float(shift), length)
+                cost = least if trial is None else left(trial)
+                if trial is not None and cost < least:
+                    best, least = trial, cost
+    return best
+
+
+def _moved(interval: Interval, side: int, shift: float, length: float) -> Interval | None:
+    """An interval with its beginning (side 0) or end (1) moved; None: there is none to move.
+
+    Args:
+        interval: [s since the start of the recording].
+        side: Which edge.
+        shift: [s].
+        length: End of the record [s since the start of the recording].
+    """
+    start, stop = interval
+    if (start <= 0.0) if side == 0 else (stop is None):
+        return None
+    if side == 0:
+        start = 0.0 if start + shift < NEAR_AN_END else start + shift
+    elif stop is not None:
+        stop = None if stop + shift > length - NEAR_AN_END else stop + shift
+    if (length if stop is None else stop) - start < SHORTEST_INTERVAL:
+        return None
+    return start, stop
 
 
 def with_interval(searcher: Searcher, current: Fit) -> Fit:
@@ -163,8 +221,10 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
             continue
         passing = replace(term, interval=interval)
         trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
-        trial = refined_interval(searcher, whitener, trial.terms[:-1], trial)
-        always = fit(whitener, searcher.station, current.terms, searcher.bank.without)
+        trial = refined_interval(searcher, whitener, trial)
+        always = fit(
+            whitener, searcher.station, current.terms, searcher.bank.without, known=current
+        )
         if total(trial) < total(always) - ONSET_GAIN and plausible(trial):
             current = trial
     return current
