@@ -288,8 +288,8 @@ class Comparison:
             return deviation
         if time is not None:
             expected = np.interp(time, self.grid.centres, expected)
-        away = np.angle(np.exp(1j * (deviation - expected)))
-        return np.asarray(expected + away, dtype=np.float64)
+        turns = np.rint((deviation - expected) / (2.0 * np.pi))
+        return np.asarray(deviation - 2.0 * np.pi * turns, dtype=np.float64)
 
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""

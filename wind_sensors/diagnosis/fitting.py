@@ -95,6 +95,17 @@ class Fit:
     slopes: FloatArray | None = None
 
 
+def without_term(known: Fit, left_out: int) -> Fit:
+    """A fit's other terms where they are, with their derivatives; not fitted again."""
+    owners = [k for k, _ in _parameters(known.terms)]
+    kept = [place for place, owner in enumerate(owners) if owner != left_out]
+    return replace(
+        known,
+        terms=tuple(t for k, t in enumerate(known.terms) if k != left_out),
+        slopes=None if known.slopes is None else known.slopes[:, kept],
+    )
+
+
 def _parameters(terms: Sequence[Term]) -> list[tuple[int, Parameter]]:
     return [(k, p) for k, term in enumerate(terms) for p in term.effect.parameters]
 
@@ -164,7 +175,12 @@ class Problem:
         return (cost if np.isfinite(cost) else np.inf), vector, simulated
 
     def slopes(
-        self, values: FloatArray, base: FloatArray, low: FloatArray, high: FloatArray
+        self,
+        values: FloatArray,
+        base: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        carried: FloatArray | None = None,
     ) -> FloatArray:
         """Derivatives of what is compared, shape (l, parameters), in units of the step.
 
@@ -172,9 +188,11 @@ class Problem:
             values: Where.
             base: What is compared there, shape (l,).
             low, high: Bounds.
+            carried: Those by the first parameters, from elsewhere.
         """
-        columns = []
-        for k, (_, parameter) in enumerate(_parameters(self._terms)):
+        columns = [] if carried is None else list(carried.T)
+        first = len(columns)
+        for k, (_, parameter) in list(enumerate(_parameters(self._terms)))[first:]:
             step = parameter.difference
             if values[k] + step > high[k]:
                 step = -step
@@ -242,8 +260,8 @@ def fit(
         terms: Effects with starting values.
         rest: Simulation of the station whose untouched instruments are reused.
         iterations: Largest number of Gauss-Newton steps.
-        known: Fit of the same effects near the same values, in whatever null, from which the
-            derivatives are carried along.
+        known: Fit of the same effects, or of the first ones, near the same values, in whatever
+            null, from which the derivatives are carried along.
     """
     problem = Problem(whitener, station, terms, rest)
     parameters = [p for _, p in _parameters(terms)]
@@ -258,7 +276,11 @@ def fit(
         cost = float(vector @ vector)
     simulated = first
     damping = 1e-2
-    slopes = None if known is None else known.slopes
+    slopes = None
+    if known is not None and known.slopes is not None:
+        slopes = problem.slopes(
+            values, problem.compared(simulated), low, high, carried=known.slopes
+        )
     normal = np.eye(len(values))
     exact = stale = False
     for _ in range(iterations):

@@ -169,7 +169,7 @@ def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
     vector = whitener.of(searcher.bank.without)
     return searcher.fit_all(
         whitener,
-        (),
+        None,
         [
             *searcher.single_candidates(whitener, vector, FIRST_CANDIDATES, blind=True),
             *window_starts(searcher, whitener, vector, set()),
@@ -204,7 +204,7 @@ def _further_fits(
         for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
         if eligible(starts) and not is_a_stall(searcher, current, starts[0])
     ]
-    return searcher.fit_all(whitener, current.terms, [*candidates, *windowed])
+    return searcher.fit_all(whitener, current, [*candidates, *windowed])
 
 
 def _greedy(

@@ -218,7 +218,7 @@ class Searcher:
         return out
 
     def best_fit(
-        self, whitener: Whitener, fixed: Sequence[Term], starts: Sequence[Term],
+        self, whitener: Whitener, current: Fit | None, starts: Sequence[Term],
         rest: Simulated | None,
     ) -> Fit:
         """Fit of known terms and one more, from the best of several starting points.
@@ -226,6 +226,7 @@ class Searcher:
         What an effect that smooths leaves unexplained depends on its size, so that each size is
         judged in the noise that it leaves itself.
         """
+        fixed = () if current is None else current.terms
         smooths = bool(starts) and starts[0].effect.smooths
         comparison = self.comparison
         ranked: list[tuple[float, int]] = []
@@ -253,7 +254,7 @@ class Searcher:
         close = CLOSE_START * float(whitener.of(self.bank.without).size)
         tried = [k for deviance, k in ranked[:TRIED_STARTS] if smooths or deviance <= best + close]
         fits = [
-            fit(whitener, self.station, [*fixed, starts[k]], rest, CANDIDATE_ITERATIONS)
+            fit(whitener, self.station, [*fixed, starts[k]], rest, CANDIDATE_ITERATIONS, current)
             for k in tried
         ]
         if smooths:
@@ -261,13 +262,13 @@ class Searcher:
         return min(fits, key=lambda f: f.cost)
 
     def fit_all(
-        self, whitener: Whitener, fixed: Sequence[Term], candidates: Sequence[Sequence[Term]]
+        self, whitener: Whitener, current: Fit | None, candidates: Sequence[Sequence[Term]]
     ) -> list[Fit]:
-        """Fits of the known terms with each candidate."""
+        """Fits of the known terms, if there are any, with each candidate."""
         rest = self.bank.without
 
         def one(starts: Sequence[Term]) -> Fit:
-            return self.best_fit(whitener, fixed, starts, rest)
+            return self.best_fit(whitener, current, starts, rest)
 
         fits: list[Fit] = in_parallel(one, list(candidates), self.workers)
         return fits
