@@ -23,8 +23,20 @@ _LARGEST_DAMPING = 1e5
 
 _LEAST_INFORMATION = 1e-4
 
+EXACT = 0.02
+"""Drop of the cost that moves the parameters by a seventh of their standard deviations."""
+
+ROUGHLY = 0.3
+"""The same where explanations are only compared with each other."""
+
+_ROUNDING = 1e-5
+"""Share of the cost that a step may gain by chance."""
+
 _NEARLY_LINEAR = 0.9
 """Derivatives are carried along after a step that gained this share of what they promised."""
+
+_SLOW = 0.3
+"""Steps with derivatives that hold gain no more than this share of what the step before gained."""
 
 
 @dataclass(frozen=True)
@@ -248,6 +260,7 @@ def fit(
     rest: Simulated | None = None,
     iterations: int = 8,
     known: Fit | None = None,
+    least: float = EXACT,
 ) -> Fit:
     """Fit terms by damped least squares within their bounds.
 
@@ -262,6 +275,7 @@ def fit(
         iterations: Largest number of Gauss-Newton steps.
         known: Fit of the same effects, or of the first ones, near the same values, in whatever
             null, from which the derivatives are carried along.
+        least: Drop of the cost that is worth another step, beside a share of the cost.
     """
     problem = Problem(whitener, station, terms, rest)
     parameters = [p for _, p in _parameters(terms)]
@@ -283,14 +297,15 @@ def fit(
         )
     normal = np.eye(len(values))
     exact = stale = False
+    before = np.inf
     for _ in range(iterations):
         if slopes is None or stale:
             slopes = problem.slopes(values, problem.compared(simulated), low, high)
-            exact, stale = True, False
+            exact, stale, before = True, False, np.inf
         jacobian = problem.whitened(slopes)
         normal = jacobian.T @ jacobian
         gradient = jacobian.T @ vector
-        enough = 0.02 + 1e-5 * cost
+        worthwhile = least + _ROUNDING * cost
         gained = promised = 0.0
         while damping < _LARGEST_DAMPING:
             weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
@@ -299,12 +314,15 @@ def fit(
             moved = (trial - values) / scale
             expected = vector + jacobian @ moved
             promised = cost - float(expected @ expected)
-            if not exact and promised < enough:
+            if promised < worthwhile:
                 break
             trial_cost, trial_vector, trial_simulated = problem.trial(trial)
             if trial_simulated is not None and trial_cost < cost:
                 gained = cost - trial_cost
-                stale = gained <= _NEARLY_LINEAR * promised
+                missed = promised - gained
+                stale = missed > max((1.0 - _NEARLY_LINEAR) * promised, worthwhile)
+                stale = stale or gained > max(_SLOW * before, worthwhile)
+                before = gained
                 slopes = _secant(slopes, moved, problem.change(simulated, trial_simulated))
                 values, vector, simulated, cost = (
                     trial, trial_vector, trial_simulated, trial_cost,
@@ -315,7 +333,7 @@ def fit(
                 stale = True
                 break
             damping *= 8.0
-        if gained < enough and (exact or promised < enough):
+        if gained < worthwhile and (exact or promised < worthwhile):
             break
         exact = False
     seen = np.diag(normal) > _LEAST_INFORMATION

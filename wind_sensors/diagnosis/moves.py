@@ -20,7 +20,7 @@ from wind_sensors.diagnosis.explanation import (
     plausible,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit, without_term
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, without_term
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
@@ -35,7 +35,14 @@ def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     while len(current.terms) > 1:
         parts = [without_term(current, k) for k in range(len(current.terms))]
         without = [
-            fit(whitener, searcher.station, part.terms, searcher.bank.without, known=part)
+            fit(
+                whitener,
+                searcher.station,
+                part.terms,
+                searcher.bank.without,
+                known=part,
+                least=ROUGHLY,
+            )
             for part in parts
         ]
         best = min(without, key=total)
@@ -100,8 +107,9 @@ def swapped(
         part = without_term(current, k)
         others = part.terms
         without = fit(
-            whitener, searcher.station, others, searcher.bank.without, iterations=3, known=part
-        )
+            whitener, searcher.station, others, searcher.bank.without, iterations=3, known=part,
+            least=ROUGHLY,
+        )  # fmt: skip
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)

@@ -25,7 +25,7 @@ from wind_sensors.diagnosis.explanation import (
     single_event,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.screening import screen
@@ -111,7 +111,7 @@ def _brings(
         return -np.inf
     whitener = candidate.whitener
     before = (
-        fit(whitener, searcher.station, current.terms, searcher.bank.without, known=current)
+        fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
         if current.terms
         else no_terms(whitener, searcher)
     )
@@ -254,7 +254,7 @@ def _greedy(
         best = total(fits[0])
         reach = FAR_BEHIND * (total(current) - best)
         pool = [f for f in fits[:FINALISTS] if total(f) - best <= reach]
-        ranked = judged(searcher, pool, named)
+        ranked = judged(searcher, pool, named, roughly=True)
         ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
         ranked = [r for r in ranked if plausible(r.fit)]
         if ranked and ranked[0].fit.terms[-1].interval != ALWAYS:
@@ -273,9 +273,7 @@ def _greedy(
         alternatives = (*alternatives, *losers) if not first else losers
     whitener = searcher.whitener(current.simulated)
     if current.terms:
-        current = fit(
-            whitener, searcher.station, current.terms, searcher.bank.without, known=current
-        )
+        current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
     else:
         current = seen_in(whitener, current)
     if len(current.terms) > 1:

@@ -108,7 +108,7 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
         moved = replace(best.terms[-1], interval=interval)
         trial = fit(
             whitener, searcher.station, [*best.terms[:-1], moved], searcher.bank.without,
-            iterations=3, known=best,
+            iterations=3,
         )  # fmt: skip
         if trial.cost >= best.cost - LEAST_REFINEMENT:
             break

@@ -133,7 +133,7 @@ def in_parallel(
         progress: Called with the share done.
     """
     out: list[Any] = []
-    if workers < 2 or len(items) < 4 or "fork" not in multiprocessing.get_all_start_methods():
+    if workers < 2 or len(items) < 2 or "fork" not in multiprocessing.get_all_start_methods():
         results: Iterable[Any] = map(function, items)
         for result in results:
             out.append(result)
@@ -143,7 +143,7 @@ def in_parallel(
     _TASK.append((function, items))
     try:
         with multiprocessing.get_context("fork").Pool(workers) as pool:
-            for result in pool.imap(_run, range(len(items)), chunksize=2):
+            for result in pool.imap(_run, range(len(items))):
                 out.append(result)
                 if progress:
                     progress(len(out) / len(items))
