@@ -30,6 +30,7 @@ from wind_sensors.diagnosis.observation import (
     stillness_statistics,
 )
 from wind_sensors.errors import UserError
+from wind_sensors.motion.frames import wrap
 from wind_sensors.simulation.drive import Drive, drive_from_recording
 from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.memory import DriveMemory, Memory
@@ -301,7 +302,7 @@ class Comparison:
             return np.full(BANDS, np.nan)
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
-        deviation = np.angle(np.exp(1j * (readings.angle - around)))
+        deviation = wrap(readings.angle - around)
         good = np.isfinite(deviation) & ~erratic(readings)
         if not good.any():
             return np.full(BANDS, np.nan)
