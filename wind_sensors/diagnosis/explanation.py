@@ -178,6 +178,7 @@ def judged(
     explanations: Sequence[Fit],
     named: Simulated | None = None,
     roughly: bool = False,
+    iterations: int = 3,
 ) -> list[Judged]:
     """Fits made again, each in its own null; best first.
 
@@ -186,12 +187,13 @@ def judged(
         explanations: Fits in whatever null.
         named: Simulation of effects whose form need not be exact.
         roughly: Carry the fits' derivatives along, which may cost some units; for a first choice.
+        iterations: Largest number of Gauss-Newton steps.
     """
 
     def one(candidate: Fit) -> tuple[Fit, float]:
         whitener = searcher.whitener(candidate.simulated, named)
         again = fit(
-            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations=3,
+            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations,
             known=candidate if roughly else None, least=ROUGHLY,
         )  # fmt: skip
         whitener = searcher.whitener(again.simulated, named)
