@@ -8,7 +8,7 @@ whitened differences, measured minus simulated, in which a healthy station gives
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,8 +30,10 @@ from wind_sensors.diagnosis.observation import (
     stillness_statistics,
 )
 from wind_sensors.errors import UserError
+from wind_sensors.motion.frames import wrap
 from wind_sensors.simulation.drive import Drive, drive_from_recording
 from wind_sensors.simulation.encoder import angle_readings
+from wind_sensors.simulation.memory import DriveMemory, Memory
 from wind_sensors.simulation.pulses import rotor_signals
 from wind_sensors.simulation.response import Response, respond
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
@@ -55,6 +57,9 @@ SHORTEST = 60.0
 FASTEST = 60.0
 """A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
 
+SIMULATIONS = 64
+"""So many simulated channels are kept: a station that is tried again is not simulated again."""
+
 BANDS = len(NORMALISED_BANDS) - 1
 
 
@@ -72,6 +77,20 @@ class Simulated:
     cosine: dict[str, FloatArray]
     series: dict[str, FloatArray]
     statistics: dict[str, FloatArray]
+
+    def with_others(self, others: Simulated) -> Simulated:
+        """The same with channels taken from another."""
+        return Simulated(
+            {**self.cosine, **others.cosine},
+            {**self.series, **others.series},
+            {**self.statistics, **others.statistics},
+        )
+
+    def flat(self, channels: Sequence[Channel]) -> FloatArray:
+        """What is compared: coefficients of all channels, then all statistics; shape (l,)."""
+        return np.concatenate(
+            [self.cosine[c.name] for c in channels] + [self.statistics[c.name] for c in channels]
+        )
 
 
 @dataclass(frozen=True)
@@ -118,6 +137,7 @@ class Comparison:
         expected: Simulated deviation of each vane from `direction` [rad], by channel name.
             Deviations are counted on the turn that lies nearest to it, so that a vane which
             swings through the opposite direction does not jump by a turn in one series only.
+        memory: What instruments did in `drive`; None: nothing is kept.
     """
 
     recording: Recording
@@ -131,6 +151,10 @@ class Comparison:
     measured: Simulated
     mask: FloatArray | None = None
     expected: Mapping[str, FloatArray] = field(default_factory=dict)
+    memory: DriveMemory | None = field(default=None, repr=False, compare=False)
+    _simulated: Memory = field(
+        default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
+    )
 
     def within(self, mask: FloatArray) -> Comparison:
         """The same comparison in the blocks of a mask only, shape (n,)."""
@@ -145,7 +169,8 @@ class Comparison:
 
     def respond(self, station: Station, only: Collection[str] = ()) -> Response:
         """The station's instruments in this recording's wind."""
-        return respond(station, self.drive, only=only)
+        known = self.memory is not None and self.memory.drive is self.drive
+        return respond(station, self.drive, only=only, memory=self.memory if known else None)
 
     def affected(self, station: Station, instrument: str) -> tuple[str, ...]:
         """Instruments whose signals depend on a change of one entry of the station."""
@@ -189,15 +214,29 @@ class Comparison:
             only: Instruments to simulate; empty: all.
             rest: Simulation to take the other instruments from.
         """
-        pulses, angles = self.signals(station, only)
-        seen = self.observe(pulses, angles)
-        if rest is None:
-            return seen
-        return Simulated(
-            {**rest.cosine, **seen.cosine},
-            {**rest.series, **seen.series},
-            {**rest.statistics, **seen.statistics},
+        seen = Simulated({}, {}, {}) if rest is None else rest
+        for channel in self.channels:
+            if not only or channel.instrument in only:
+                seen = seen.with_others(self._simulated_alone(station, channel.instrument))
+        return seen
+
+    def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
+        """Series and statistics of one instrument."""
+        reaching = self._reaching(station, instrument)
+        changes = tuple(c for c in station.changes if c.instrument in {*reaching, PLATFORM})
+        parts = [station.instrument(name) for name in reaching]
+        key = repr((instrument, parts, station.platform, station.sensor_heading_deg, changes))
+        alone = station.model_copy(update={"changes": changes})
+        return self._simulated.of(
+            key, lambda: self.observe(*self.signals(alone, (instrument,)))
         )
+
+    def _reaching(self, station: Station, instrument: str) -> tuple[str, ...]:
+        """Instruments on which the signals of one depend: itself and what carries it."""
+        own = station.instrument(instrument)
+        if isinstance(own, Propeller) and own.mounted_on:
+            return instrument, own.mounted_on
+        return (instrument,)
 
     def observe(self, pulses: Mapping[str, Pulses], angles: Mapping[str, Angles]) -> Simulated:
         """Series and statistics of pulses and readings; of those channels that have any."""
@@ -250,8 +289,8 @@ class Comparison:
             return deviation
         if time is not None:
             expected = np.interp(time, self.grid.centres, expected)
-        away = np.angle(np.exp(1j * (deviation - expected)))
-        return np.asarray(expected + away, dtype=np.float64)
+        turns = np.rint((deviation - expected) / (2.0 * np.pi))
+        return np.asarray(deviation - 2.0 * np.pi * turns, dtype=np.float64)
 
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""
@@ -263,7 +302,7 @@ class Comparison:
             return np.full(BANDS, np.nan)
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
-        deviation = np.angle(np.exp(1j * (readings.angle - around)))
+        deviation = wrap(readings.angle - around)
         good = np.isfinite(deviation) & ~erratic(readings)
         if not good.any():
             return np.full(BANDS, np.nan)
@@ -322,6 +361,15 @@ class Comparison:
                 - t.statistics_mean
             )
             parts.append(np.nan_to_num(difference / t.statistics_deviation))
+        return np.concatenate(parts)
+
+    def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
+        """How far `vector` falls when what is compared rises by one, shape (l,)."""
+        parts = [trust[c.name].slope / trust[c.name].deviation for c in self.channels]
+        for channel in self.channels:
+            seen = np.isfinite(self.measured.statistics[channel.name])
+            deviation = trust[channel.name].statistics_deviation
+            parts.append(np.where(seen, 1.0 / deviation, 0.0))
         return np.concatenate(parts)
 
     def residual_series(
@@ -390,6 +438,7 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
         speed=np.maximum(slow_speed, 0.5),
         wind_from=np.interp(grid.centres, at, coming_from),
         measured=empty,
+        memory=DriveMemory(drive),
     )
     comparison = replace(comparison, expected=_expected(comparison))
     seen = _where_reference_is(recording, grid)

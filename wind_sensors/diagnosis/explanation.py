@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.comparison import Simulated
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_INTERVAL,
@@ -177,6 +177,7 @@ def judged(
     searcher: Searcher,
     explanations: Sequence[Fit],
     named: Simulated | None = None,
+    roughly: bool = False,
     iterations: int = 3,
 ) -> list[Judged]:
     """Fits made again, each in its own null; best first.
@@ -185,14 +186,16 @@ def judged(
         searcher: The search.
         explanations: Fits in whatever null.
         named: Simulation of effects whose form need not be exact.
+        roughly: Carry the fits' derivatives along, which may cost some units; for a first choice.
         iterations: Largest number of Gauss-Newton steps.
     """
 
     def one(candidate: Fit) -> tuple[Fit, float]:
         whitener = searcher.whitener(candidate.simulated, named)
         again = fit(
-            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations
-        )
+            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations,
+            known=candidate if roughly else None, least=ROUGHLY,
+        )  # fmt: skip
         whitener = searcher.whitener(again.simulated, named)
         again = seen_in(whitener, again)
         return again, evidence(again, whitener)

@@ -23,8 +23,20 @@ _LARGEST_DAMPING = 1e5
 
 _LEAST_INFORMATION = 1e-4
 
+EXACT = 0.02
+"""Drop of the cost that moves the parameters by a seventh of their standard deviations."""
+
+ROUGHLY = 0.3
+"""The same where explanations are only compared with each other."""
+
+_ROUNDING = 1e-5
+"""Share of the cost that a step may gain by chance."""
+
 _NEARLY_LINEAR = 0.9
 """Derivatives are carried along after a step that gained this share of what they promised."""
+
+_SLOW = 0.3
+"""Steps with derivatives that hold gain no more than this share of what the step before gained."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +93,8 @@ class Fit:
             variance where the recording cannot see one.
         evaluations: Number of simulations it took.
         active: Number of parameters that the recording can see.
+        slopes: Derivatives of what is compared (`Simulated.flat`) by the parameters in units of
+            their steps, shape (l, parameters); None: not known. They hold in any null.
     """
 
     terms: tuple[Term, ...]
@@ -90,6 +104,18 @@ class Fit:
     covariance: FloatArray
     evaluations: int
     active: int = 0
+    slopes: FloatArray | None = None
+
+
+def without_term(known: Fit, left_out: int) -> Fit:
+    """A fit's other terms where they are, with their derivatives; not fitted again."""
+    owners = [k for k, _ in _parameters(known.terms)]
+    kept = [place for place, owner in enumerate(owners) if owner != left_out]
+    return replace(
+        known,
+        terms=tuple(t for k, t in enumerate(known.terms) if k != left_out),
+        slopes=None if known.slopes is None else known.slopes[:, kept],
+    )
 
 
 def _parameters(terms: Sequence[Term]) -> list[tuple[int, Parameter]]:
@@ -153,43 +179,78 @@ class Problem:
 
     def trial(self, values: FloatArray) -> tuple[float, FloatArray, Simulated | None]:
         """Cost, white vector and simulation; an infinite cost where the station is impossible."""
-        try:
-            vector, simulated = self.vector(values)
-        except (UserError, ValueError):
+        simulated = self._possible(values)
+        if simulated is None:
             return np.inf, np.zeros(0), None
+        vector = self._whitener.of(simulated)
         cost = float(vector @ vector)
         return (cost if np.isfinite(cost) else np.inf), vector, simulated
 
-    def jacobian(
-        self, values: FloatArray, base: FloatArray, low: FloatArray, high: FloatArray
+    def slopes(
+        self,
+        values: FloatArray,
+        base: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        carried: FloatArray | None = None,
     ) -> FloatArray:
-        """Derivatives of the white vector, shape (m, parameters), in units of the step."""
-        columns = []
-        for k, (_, parameter) in enumerate(_parameters(self._terms)):
+        """Derivatives of what is compared, shape (l, parameters), in units of the step.
+
+        Args:
+            values: Where.
+            base: What is compared there, shape (l,).
+            low, high: Bounds.
+            carried: Those by the first parameters, from elsewhere.
+        """
+        columns = [] if carried is None else list(carried.T)
+        first = len(columns)
+        for k, (_, parameter) in list(enumerate(_parameters(self._terms)))[first:]:
             step = parameter.difference
             if values[k] + step > high[k]:
                 step = -step
             moved = values.copy()
             moved[k] = min(max(values[k] + step, low[k]), high[k])
             shift = (moved[k] - values[k]) / parameter.difference
-            cost, vector, _ = self.trial(moved)
-            if not np.isfinite(cost) or shift == 0.0:
+            simulated = self._possible(moved) if shift != 0.0 else None
+            if simulated is None:
                 columns.append(np.zeros_like(base))
             else:
-                columns.append((vector - base) / shift)
+                columns.append(self._change(base, simulated) / shift)
         return np.asarray(np.array(columns).T, dtype=np.float64)
 
+    def _possible(self, values: FloatArray) -> Simulated | None:
+        """Simulation with given parameters; None where the station is impossible."""
+        try:
+            return self.simulate(values)
+        except (UserError, ValueError):
+            return None
 
-def _secant(jacobian: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
+    def compared(self, simulated: Simulated) -> FloatArray:
+        """What is compared of a simulation, shape (l,)."""
+        return simulated.flat(self._whitener.comparison.channels)
+
+    def change(self, before: Simulated, after: Simulated) -> FloatArray:
+        """How far what is compared moves, zero where it cannot be told; shape (l,)."""
+        return self._change(self.compared(before), after)
+
+    def _change(self, base: FloatArray, moved: Simulated) -> FloatArray:
+        return np.asarray(np.nan_to_num(self.compared(moved) - base))
+
+    def whitened(self, slopes: FloatArray) -> FloatArray:
+        """Derivatives of the white vector, shape (m, parameters)."""
+        return np.asarray(-self._whitener.of_changes(slopes.T).T, dtype=np.float64)
+
+
+def _secant(slopes: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
     """The smallest change of the derivatives that agrees with the last step (Broyden).
 
     Args:
-        jacobian: Shape (m, parameters).
+        slopes: Shape (l, parameters).
         step: Of the parameters, shape (parameters,).
-        change: Of the white vector, shape (m,).
+        change: Of what is compared, shape (l,).
     """
-    missed = change - jacobian @ step
-    return np.asarray(jacobian + np.outer(missed, step) / max(float(step @ step), 1e-12))
+    missed = change - slopes @ step
+    return np.asarray(slopes + np.outer(missed, step) / max(float(step @ step), 1e-12))
 
 
 def fit(
@@ -198,6 +259,8 @@ def fit(
     terms: Sequence[Term],
     rest: Simulated | None = None,
     iterations: int = 8,
+    known: Fit | None = None,
+    least: float = EXACT,
 ) -> Fit:
     """Fit terms by damped least squares within their bounds.
 
@@ -210,20 +273,14 @@ def fit(
         terms: Effects with starting values.
         rest: Simulation of the station whose untouched instruments are reused.
         iterations: Largest number of Gauss-Newton steps.
+        known: Fit of the same effects, or of the first ones, near the same values, in whatever
+            null, from which the derivatives are carried along.
+        least: Drop of the cost that is worth another step, beside a share of the cost.
     """
     problem = Problem(whitener, station, terms, rest)
     parameters = [p for _, p in _parameters(terms)]
-    low = np.array([p.low for p in parameters])
-    high = np.array([p.high for p in parameters])
+    low, high = _bounds(whitener, terms)
     scale = np.array([p.difference for p in parameters])
-    air = whitener.comparison.drive.temperature
-    swing = 0.0 if air is None else float(np.ptp(air))
-    for k, parameter in enumerate(parameters):
-        tied = parameter.free is not None and not parameter.free(whitener.comparison.drive)
-        if (tied or parameter.swing > swing) and parameter.healthy is not None:
-            low[k] = high[k] = parameter.healthy
-        elif not parameter.fitted:
-            low[k] = high[k] = values_of(terms)[k]
     values = np.clip(values_of(terms), low, high)
     cost, vector, first = problem.trial(values)
     if first is None:
@@ -233,42 +290,51 @@ def fit(
         cost = float(vector @ vector)
     simulated = first
     damping = 1e-2
+    slopes = None
+    if known is not None and known.slopes is not None:
+        slopes = problem.slopes(
+            values, problem.compared(simulated), low, high, carried=known.slopes
+        )
     normal = np.eye(len(values))
-    jacobian: FloatArray | None = None
-    exact = False
+    exact = stale = False
+    before = np.inf
     for _ in range(iterations):
-        if jacobian is None:
-            jacobian = problem.jacobian(values, vector, low, high)
-            exact = True
+        if slopes is None or stale:
+            slopes = problem.slopes(values, problem.compared(simulated), low, high)
+            exact, stale, before = True, False, np.inf
+        jacobian = problem.whitened(slopes)
         normal = jacobian.T @ jacobian
         gradient = jacobian.T @ vector
-        gained = 0.0
+        worthwhile = least + _ROUNDING * cost
+        gained = promised = 0.0
         while damping < _LARGEST_DAMPING:
             weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
             step = -np.linalg.solve(weighted, gradient) * scale
             trial = np.clip(values + step, low, high)
+            moved = (trial - values) / scale
+            expected = vector + jacobian @ moved
+            promised = cost - float(expected @ expected)
+            if promised < worthwhile:
+                break
             trial_cost, trial_vector, trial_simulated = problem.trial(trial)
             if trial_simulated is not None and trial_cost < cost:
                 gained = cost - trial_cost
-                moved = (trial - values) / scale
-                expected = vector + jacobian @ moved
-                promised = cost - float(expected @ expected)
-                if gained > _NEARLY_LINEAR * promised:
-                    jacobian = _secant(jacobian, moved, trial_vector - vector)
-                else:
-                    jacobian = None
+                missed = promised - gained
+                stale = missed > max((1.0 - _NEARLY_LINEAR) * promised, worthwhile)
+                stale = stale or gained > max(_SLOW * before, worthwhile)
+                before = gained
+                slopes = _secant(slopes, moved, problem.change(simulated, trial_simulated))
                 values, vector, simulated, cost = (
                     trial, trial_vector, trial_simulated, trial_cost,
                 )  # fmt: skip
                 damping = max(damping * 0.2, 1e-6)
                 break
             if not exact:
+                stale = True
                 break
             damping *= 8.0
-        if gained < 0.02 + 1e-5 * cost:
-            if exact:
-                break
-            jacobian = None
+        if gained < worthwhile and (exact or promised < worthwhile):
+            break
         exact = False
     seen = np.diag(normal) > _LEAST_INFORMATION
     covariance = np.diag(np.where(seen, 0.0, np.inf))
@@ -277,4 +343,22 @@ def fit(
     covariance[np.ix_(seen, seen)] = np.linalg.pinv(information[np.ix_(seen, seen)])
     fitted = _with_values(terms, values)
     active = int(np.count_nonzero(seen))
-    return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations, active)
+    return Fit(
+        fitted, cost, vector, simulated, covariance, problem.evaluations, active, slopes
+    )
+
+
+def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
+    """Bounds of all parameters; those that are not to be fitted have no room."""
+    parameters = [p for _, p in _parameters(terms)]
+    low = np.array([p.low for p in parameters])
+    high = np.array([p.high for p in parameters])
+    drive = whitener.comparison.drive
+    swing = 0.0 if drive.temperature is None else float(np.ptp(drive.temperature))
+    for k, parameter in enumerate(parameters):
+        tied = parameter.free is not None and not parameter.free(drive)
+        if (tied or parameter.swing > swing) and parameter.healthy is not None:
+            low[k] = high[k] = parameter.healthy
+        elif not parameter.fitted:
+            low[k] = high[k] = values_of(terms)[k]
+    return low, high

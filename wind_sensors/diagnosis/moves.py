@@ -20,7 +20,7 @@ from wind_sensors.diagnosis.explanation import (
     plausible,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, without_term
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
@@ -33,13 +33,18 @@ SWAP_GAIN = 1.0
 def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit without terms that later ones made superfluous."""
     while len(current.terms) > 1:
+        parts = [without_term(current, k) for k in range(len(current.terms))]
         without = [
             fit(
-                whitener, searcher.station,
-                [t for j, t in enumerate(current.terms) if j != k], searcher.bank.without,
+                whitener,
+                searcher.station,
+                part.terms,
+                searcher.bank.without,
+                known=part,
+                least=ROUGHLY,
             )
-            for k in range(len(current.terms))
-        ]  # fmt: skip
+            for part in parts
+        ]
         best = min(without, key=total)
         if total(best) - total(current) > ACCEPTED_GAIN and all(
             t.relative_size >= SMALLEST_SIZE for t in current.terms
@@ -99,15 +104,19 @@ def swapped(
     losers: list[Judged] = []
     leader = Judged(current, whitener, evidence(current, whitener))
     for k in range(len(current.terms)):
-        others = [t for j, t in enumerate(current.terms) if j != k]
-        without = fit(whitener, searcher.station, others, searcher.bank.without, iterations=3)
+        part = without_term(current, k)
+        others = part.terms
+        without = fit(
+            whitener, searcher.station, others, searcher.bank.without, iterations=3, known=part,
+            least=ROUGHLY,
+        )  # fmt: skip
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
             if may_join(starts[0], others) and starts[0].key != current.terms[k].key
         ]
         rivals = [
-            f for f in searcher.fit_all(whitener, without.terms, candidates) if plausible(f)
+            f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)
         ]
         ranked = [r for r in judged(searcher, rivals) if plausible(r.fit)]
         losers.extend(ranked)

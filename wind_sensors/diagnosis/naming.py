@@ -26,7 +26,7 @@ from wind_sensors.diagnosis.explanation import (
     single_event,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.screening import screen
@@ -102,7 +102,7 @@ def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
 
 
 def _brings(
-    searcher: Searcher, candidate: Judged, fixed: Sequence[Term], before_evidence: float
+    searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float
 ) -> float:
     """What a candidate gains over the terms before: in its own null and in likelihood, the less.
 
@@ -113,8 +113,8 @@ def _brings(
         return -np.inf
     whitener = candidate.whitener
     before = (
-        fit(whitener, searcher.station, fixed, searcher.bank.without)
-        if fixed
+        fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
+        if current.terms
         else no_terms(whitener, searcher)
     )
     gain = total(before) - total(candidate.fit) - single_event(searcher, before, candidate.fit)
@@ -145,7 +145,7 @@ def _leader(
     for one in ranked:
         if one.evidence > likeliest + CLEARLY_BETTER:
             break
-        brings = _brings(searcher, one, current.terms, so_far)
+        brings = _brings(searcher, one, current, so_far)
         least = max(needed, _inexactness(searcher, whitener, current, one.fit.terms[-1]))
         if brings >= least and brings > most:
             leader, most = one, brings
@@ -159,7 +159,7 @@ def _with_sharp_intervals(
     """The same explanations with beginnings and ends where they fit best; best first."""
 
     def sharper(one: Judged) -> Fit:
-        return refined_interval(searcher, one.whitener, one.fit.terms[:-1], one.fit)
+        return refined_interval(searcher, one.whitener, one.fit)
 
     passing = [r for r in ranked if r.fit.terms[-1].interval != ALWAYS]
     lasting = [r for r in ranked if r.fit.terms[-1].interval == ALWAYS]
@@ -185,7 +185,7 @@ def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
     vector = whitener.of(searcher.bank.without)
     return searcher.fit_all(
         whitener,
-        (),
+        None,
         [
             *searcher.single_candidates(whitener, vector, FIRST_CANDIDATES, blind=True),
             *window_starts(searcher, whitener, vector, set()),
@@ -220,7 +220,7 @@ def _further_fits(
         for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
         if eligible(starts) and not is_a_stall(searcher, current, starts[0])
     ]
-    return searcher.fit_all(whitener, current.terms, [*candidates, *windowed])
+    return searcher.fit_all(whitener, current, [*candidates, *windowed])
 
 
 def _greedy(
@@ -270,7 +270,7 @@ def _greedy(
         best = total(fits[0])
         reach = FAR_BEHIND * (total(current) - best)
         pool = [f for f in fits[:FINALISTS] if total(f) - best <= reach]
-        ranked = judged(searcher, pool, named)
+        ranked = judged(searcher, pool, named, roughly=True)
         ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
         ranked = [r for r in ranked if plausible(r.fit)]
         ranked = _with_sharp_intervals(searcher, ranked, named)

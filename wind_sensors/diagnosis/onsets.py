@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -162,9 +161,7 @@ def _around(edge: float, step: float, low: float, high: float) -> FloatArray:
     return np.asarray(places[(places > low + NEAR_AN_END) & (places < high - NEAR_AN_END)])
 
 
-def refined_interval(
-    searcher: Searcher, whitener: Whitener, fixed: Sequence[Term], candidate: Fit
-) -> Fit:
+def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
     """The fit with its last term's beginning and end where they fit best.
 
     First a coarse search that may also give it an end, or a beginning, that it did not have; then
@@ -173,10 +170,10 @@ def refined_interval(
     Args:
         searcher: The search.
         whitener: The null.
-        fixed: The terms before the last.
         candidate: The fit.
     """
     comparison = searcher.comparison
+    fixed = candidate.terms[:-1]
     without = comparison.simulate(planted(searcher.station, fixed))
     best = candidate
     always: Simulated | None = None
@@ -268,8 +265,10 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
             continue
         passing = replace(term, interval=_since_start(searcher, span.window))
         trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
-        trial = refined_interval(searcher, whitener, trial.terms[:-1], trial)
-        always = fit(whitener, searcher.station, current.terms, searcher.bank.without)
+        trial = refined_interval(searcher, whitener, trial)
+        always = fit(
+            whitener, searcher.station, current.terms, searcher.bank.without, known=current
+        )
         if total(trial) < total(always) - ONSET_GAIN and plausible(trial):
             current = trial
     return current

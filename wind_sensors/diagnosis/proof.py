@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
-from wind_sensors.diagnosis.fitting import Term, fit, planted
+from wind_sensors.diagnosis.fitting import ROUGHLY, Term, fit, planted
 from wind_sensors.diagnosis.whitening import Whitener
 from wind_sensors.station.model import Station
 
@@ -104,7 +104,7 @@ def _fold(
     fitting: Whitener, scoring: Whitener, station: Station, terms: Sequence[Term],
     rest: tuple[Simulated, Simulated],
 ) -> _Fold:
-    fitted = fit(fitting, station, terms, rest[0], iterations=4)
+    fitted = fit(fitting, station, terms, rest[0], iterations=4, least=ROUGHLY)
     corrected = scoring.comparison.simulate(planted(station, fitted.terms))
     before = _block_costs(scoring, scoring.of(rest[1]))
     after = _block_costs(scoring, scoring.of(corrected))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
 from wind_sensors.diagnosis.effects.definition import STATION, Effect
-from wind_sensors.diagnosis.fitting import Fit, Term, fit, planted
+from wind_sensors.diagnosis.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
@@ -49,8 +49,11 @@ COMMON_LAG = 0.5
 SINGLE_LAG = 0.25
 """The same of what a channel adds of its own, and of the change within half a record."""
 
-CANDIDATE_ITERATIONS = 6
-"""Gauss-Newton steps of a candidate's fit; the best few are fitted to the end."""
+FIRST_ITERATIONS = 3
+"""Gauss-Newton steps from each starting point of a candidate."""
+
+LAST_ITERATIONS = 4
+"""Further ones from the best of them; the best few candidates are fitted to the end."""
 
 TRIED_STARTS = 2
 CLOSE_START = 0.05
@@ -219,7 +222,7 @@ class Searcher:
         return out
 
     def best_fit(
-        self, whitener: Whitener, fixed: Sequence[Term], starts: Sequence[Term],
+        self, whitener: Whitener, current: Fit | None, starts: Sequence[Term],
         rest: Simulated | None,
     ) -> Fit:
         """Fit of known terms and one more, from the best of several starting points.
@@ -227,6 +230,7 @@ class Searcher:
         What an effect that smooths leaves unexplained depends on its size, so that each size is
         judged in the noise that it leaves itself.
         """
+        fixed = () if current is None else current.terms
         smooths = bool(starts) and starts[0].effect.smooths
         comparison = self.comparison
         ranked: list[tuple[float, int]] = []
@@ -254,21 +258,29 @@ class Searcher:
         close = CLOSE_START * float(whitener.of(self.bank.without).size)
         tried = [k for deviance, k in ranked[:TRIED_STARTS] if smooths or deviance <= best + close]
         fits = [
-            fit(whitener, self.station, [*fixed, starts[k]], rest, CANDIDATE_ITERATIONS)
+            fit(
+                whitener, self.station, [*fixed, starts[k]], rest, FIRST_ITERATIONS, current,
+                ROUGHLY,
+            )
             for k in tried
-        ]
-        if smooths:
-            return min(fits, key=lambda f: self.whitener(f.simulated).deviance(f.simulated))
-        return min(fits, key=lambda f: f.cost)
+        ]  # fmt: skip
+        ahead = fits[0]
+        if len(fits) > 1 and smooths:
+            ahead = min(fits, key=lambda f: self.whitener(f.simulated).deviance(f.simulated))
+        elif len(fits) > 1:
+            ahead = min(fits, key=lambda f: f.cost)
+        return fit(
+            whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
+        )
 
     def fit_all(
-        self, whitener: Whitener, fixed: Sequence[Term], candidates: Sequence[Sequence[Term]]
+        self, whitener: Whitener, current: Fit | None, candidates: Sequence[Sequence[Term]]
     ) -> list[Fit]:
-        """Fits of the known terms with each candidate."""
+        """Fits of the known terms, if there are any, with each candidate."""
         rest = self.bank.without
 
         def one(starts: Sequence[Term]) -> Fit:
-            return self.best_fit(whitener, fixed, starts, rest)
+            return self.best_fit(whitener, current, starts, rest)
 
         fits: list[Fit] = in_parallel(one, list(candidates), self.workers)
         return fits
@@ -277,7 +289,7 @@ class Searcher:
         """Fits of whole explanations from where they are."""
         rest = self.bank.without
         fits: list[Fit] = in_parallel(
-            lambda terms: fit(whitener, self.station, terms, rest),
+            lambda terms: fit(whitener, self.station, terms, rest, least=ROUGHLY),
             list(explanations),
             self.workers,
         )

@@ -19,6 +19,7 @@ from wind_sensors.diagnosis.effects.definition import (
     touched,
     with_effect,
 )
+from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -132,7 +133,7 @@ def in_parallel(
         progress: Called with the share done.
     """
     out: list[Any] = []
-    if workers < 2 or len(items) < 4 or "fork" not in multiprocessing.get_all_start_methods():
+    if workers < 2 or len(items) < 2 or "fork" not in multiprocessing.get_all_start_methods():
         results: Iterable[Any] = map(function, items)
         for result in results:
             out.append(result)
@@ -142,7 +143,7 @@ def in_parallel(
     _TASK.append((function, items))
     try:
         with multiprocessing.get_context("fork").Pool(workers) as pool:
-            for result in pool.imap(_run, range(len(items)), chunksize=2):
+            for result in pool.imap(_run, range(len(items))):
                 out.append(result)
                 if progress:
                     progress(len(out) / len(items))
@@ -164,34 +165,21 @@ class SignatureBank:
     templates: list[Template]
     without: Simulated
     with_each: list[Simulated]
-    _changes: dict[tuple[str, ...], FloatArray] = field(
+    _changes: dict[tuple[Channel, ...], FloatArray] = field(
         default_factory=dict, repr=False, compare=False
     )
 
     def whitened(self, comparison: Comparison, trust: Mapping[str, Trust]) -> FloatArray:
         """Noise-whitened signatures, one a row."""
-        weights = []
-        for channel in comparison.channels:
-            t = trust[channel.name]
-            weights.append(t.slope / t.deviation)
-        for channel in comparison.channels:
-            measured = comparison.measured.statistics[channel.name]
-            deviation = trust[channel.name].statistics_deviation
-            weights.append(np.where(np.isfinite(measured), 1.0 / deviation, 0.0))
-        return self._changed(tuple(c.name for c in comparison.channels)) * np.concatenate(weights)
+        return self._changed(comparison.channels) * comparison.weights(trust)
 
-    def _changed(self, channels: tuple[str, ...]) -> FloatArray:
+    def _changed(self, channels: tuple[Channel, ...]) -> FloatArray:
         """What each template changes in all coefficients and statistics, one a row."""
         if channels not in self._changes:
-            rows = []
-            for each in self.with_each:
-                parts = [each.cosine[c] - self.without.cosine[c] for c in channels]
-                parts += [
-                    np.nan_to_num(each.statistics[c] - self.without.statistics[c])
-                    for c in channels
-                ]
-                rows.append(np.concatenate(parts))
-            self._changes[channels] = np.array(rows)
+            healthy = self.without.flat(channels)
+            self._changes[channels] = np.array(
+                [np.nan_to_num(each.flat(channels) - healthy) for each in self.with_each]
+            )
         return self._changes[channels]
 
 
@@ -210,12 +198,5 @@ def signature_bank(
         return comparison.simulate(template.planted(station), only=only)
 
     parts = in_parallel(planted, templates, workers, progress)
-    with_each = [
-        Simulated(
-            {**without.cosine, **part.cosine},
-            {**without.series, **part.series},
-            {**without.statistics, **part.statistics},
-        )
-        for part in parts
-    ]
+    with_each = [without.with_others(part) for part in parts]
     return SignatureBank(templates, without, with_each)

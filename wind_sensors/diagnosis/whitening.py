@@ -115,6 +115,10 @@ class Whitener:
         """White vector of a simulation."""
         return self.through_standing(self.noise_whitened(simulated))
 
+    def of_changes(self, changes: FloatArray) -> FloatArray:
+        """White signatures of changes of what is compared, one a row."""
+        return self.through_standing(changes * self.comparison.weights(self.trust))
+
     def deviance(self, simulated: Simulated) -> float:
         """Minus twice the log-likelihood of a simulation, but for a constant."""
         vector = self.of(simulated)

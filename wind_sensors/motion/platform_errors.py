@@ -43,13 +43,15 @@ def heading_without_error(deviation: HeadingDeviation, reported: npt.ArrayLike) 
     Newton's method; the deviation's slope stays far below one for any compass worth the name.
     """
     target = np.asarray(reported, dtype=np.float64)
+    a = np.radians(deviation.constant_deg)
     b, c = np.radians(deviation.sine_deg), np.radians(deviation.cosine_deg)
     d, e = np.radians(deviation.sine_2_deg), np.radians(deviation.cosine_2_deg)
     heading = target - heading_error(deviation, target)
     for _ in range(6):
-        excess = heading + heading_error(deviation, heading) - target
-        slope = b * np.cos(heading) - c * np.sin(heading)
-        slope += 2.0 * (d * np.cos(2.0 * heading) - e * np.sin(2.0 * heading))
+        sine, cosine = np.sin(heading), np.cos(heading)
+        sine_2, cosine_2 = 2.0 * sine * cosine, cosine * cosine - sine * sine
+        excess = heading + (a + b * sine + c * cosine + d * sine_2 + e * cosine_2) - target
+        slope = b * cosine - c * sine + 2.0 * (d * cosine_2 - e * sine_2)
         heading = heading - excess / (1.0 + slope)
     result: FloatArray = heading
     return result

@@ -20,8 +20,8 @@ FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 
-CLOSE = 1e-8
-"""A Newton step this small leaves an error of the order of its square."""
+CLOSE = 1e-6
+"""A Newton step this small leaves an error of the order of its square, far below a nanosecond."""
 
 
 @compiled
@@ -257,7 +257,8 @@ class PulseCircuit:
             times = times[_after_dead_time(times, round(electronics.dead_time * 1e9), self._last)]
         if times.size:
             self._last = int(times[-1])
-        times = times[~self._silent(rotor, times)]
+        if rotor.outages:
+            times = times[~self._silent(rotor, times)]
         return stamps(rotor.clock, times, self._origin)
 
 

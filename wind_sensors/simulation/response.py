@@ -7,16 +7,19 @@ never of the integration.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
+from wind_sensors.instruments.dynamics.rotor import RotorParameters
 from wind_sensors.instruments.dynamics.rotor_record import cup_axes, integrate_rotor
 from wind_sensors.instruments.dynamics.vane import integrate_vane, propeller_vane_axes
 from wind_sensors.simulation.drive import Drive
+from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.simulation.wind_at_sensor import Flow, WindAtSensors
 from wind_sensors.station.changes import Segment, segments
 from wind_sensors.station.model import (
@@ -32,6 +35,8 @@ from wind_sensors.station.model import (
 from wind_sensors.station.parameters import rotor_parameters, vane_parameters
 
 FloatArray = npt.NDArray[np.float64]
+
+_Movement = TypeVar("_Movement")
 
 LARGEST_TURN_PER_NODE = 1.0
 """Turn of a rotor with a once-per-revolution torque between two of its results [rad]."""
@@ -129,6 +134,7 @@ def respond(
     drive: Drive,
     state: ResponseState | None = None,
     only: Collection[str] = (),
+    memory: DriveMemory | None = None,
 ) -> Response:
     """Movements of the instruments in a wind.
 
@@ -139,6 +145,7 @@ def respond(
             equilibrium with the wind.
         only: Names of the instruments wanted; empty: all. What carries a wanted instrument is
             computed too.
+        memory: What is known of other stations in this drive.
 
     Returns:
         Movements at the drive's instants.
@@ -154,7 +161,7 @@ def respond(
     angle_parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
     for stretch in stretches:
         part = _part(drive, stretch)
-        worker = _Worker(stretch.segment.station, part, now, nodes)
+        worker = _Worker(stretch, part, now, nodes, memory)
         for name in wanted:
             worker.run(name)
         for name, movement in worker.rotors.items():
@@ -250,37 +257,32 @@ class _Worker:
     """Runs the kernels of one stretch and keeps where they end."""
 
     def __init__(
-        self, station: Station, drive: Drive, start: ResponseState, nodes: dict[str, int]
+        self,
+        stretch: Stretch,
+        drive: Drive,
+        start: ResponseState,
+        nodes: dict[str, int],
+        memory: DriveMemory | None,
     ) -> None:
-        self._station = station
+        self._station = stretch.segment.station
+        self._part = (stretch.first, stretch.last)
         self._drive = drive
         self._start = start
         self._nodes = nodes
-        self._winds = WindAtSensors(station, drive)
+        self._memory = memory
+        self._winds = WindAtSensors(self._station, drive, memory, self._part)
+        self._keys: dict[str, Hashable] = {}
         self.rotors: dict[str, tuple[FloatArray, FloatArray, float]] = {}
         self.angles: dict[str, tuple[FloatArray, FloatArray]] = {}
 
     def run(self, name: str) -> None:
         instrument = self._station.instrument(name)
         if isinstance(instrument, Vane):
-            flow = self._winds.flow(instrument)
-            self.angles[name] = self._turned(
-                name, instrument, flow.wind, flow.turning[:, 2], flow.gravity[:, :2]
-            )
+            self._run_vane(instrument)
         elif isinstance(instrument, Bivane):
             self._run_bivane(instrument)
-        elif isinstance(instrument, Cup):
-            self._run_rotor(instrument, cup_axes(self._winds.flow(instrument).wind))
-        elif instrument.mounted_on:
-            carrier = self._station.instrument(instrument.mounted_on)
-            flow = self._winds.flow(instrument, carrier.tilt_deg)
-            phi, rate = self.angles[carrier.name]
-            axes = propeller_vane_axes(
-                flow.wind, phi, rate + flow.turning[:, 2], instrument.distance_to_vane_axis
-            )
-            self._run_rotor(instrument, axes)
         else:
-            self._run_rotor(instrument, _fixed_axes(instrument, self._winds.flow(instrument)))
+            self._run_rotor(instrument)
 
     def state(self) -> ResponseState:
         """Where everything is at the end of the stretch."""
@@ -290,10 +292,31 @@ class _Worker:
             {n: (float(a[-1]), float(r[-1])) for n, (a, r) in self.angles.items()},
         )  # fmt: skip
 
+    def _known(self, key: Hashable, compute: Callable[[], _Movement]) -> _Movement:
+        """What follows from a key in this part of the drive."""
+        if self._memory is None:
+            return compute()
+        return self._memory.movements.of((self._part, key), compute)
+
     def _density_ratio(self, reference: float) -> FloatArray:
         if self._drive.density is None:
             return np.full(len(self._drive), STANDARD_DENSITY / reference)
         return self._drive.density / reference
+
+    def _run_vane(self, vane: Vane) -> None:
+        name = vane.name
+        parameters = vane_parameters(vane)
+        key = (
+            parameters, vane.reference_density, self._winds.key(vane),
+            self._start.angles.get(name),
+        )  # fmt: skip
+
+        def turned() -> tuple[FloatArray, FloatArray]:
+            flow = self._winds.flow(vane)
+            return self._turned(name, vane, flow.wind, flow.turning[:, 2], flow.gravity[:, :2])
+
+        self._keys[name] = key
+        self.angles[name] = self._known(key, turned)
 
     def _turned(
         self, name: str, vane: Angle, wind: FloatArray, turning: FloatArray, gravity: FloatArray
@@ -332,27 +355,59 @@ class _Worker:
         elevation = f"{name}/elevation"
         self.angles[elevation] = self._turned(elevation, bivane, in_plane, pitching, pull)
 
-    def _run_rotor(
-        self, rotor: Cup | Propeller, axes: tuple[FloatArray, FloatArray, FloatArray]
-    ) -> None:
-        axial, transverse, lateral = axes
+    def _run_rotor(self, rotor: Cup | Propeller) -> None:
         parameters = rotor_parameters(rotor)
-        rate, psi = self._start.rotors.get(rotor.name, (np.nan, 0.0))
-        temperature = self._drive.temperature
-        if temperature is None:
-            temperature = np.full(axial.shape, rotor.reference_temperature)
-        length = rotor.calibration_distance
-        y, turned = integrate_rotor(
-            parameters, axial, transverse, lateral, self._density_ratio(rotor.reference_density),
-            temperature, self._drive.dt, self._nodes[rotor.name], rate * length, psi,
+        start = self._start.rotors.get(rotor.name, (np.nan, 0.0))
+        numbers = tuple(v for v in parameters if not isinstance(v, np.ndarray))
+        key = (
+            numbers, parameters.angular_response.tobytes(), rotor.reference_density,
+            self._nodes[rotor.name], self._start.rotors.get(rotor.name), self._axes_key(rotor),
         )  # fmt: skip
+        y, turned = self._known(key, lambda: self._rotated(rotor, parameters, start))
         if not np.isfinite(y[-1]):
             raise UserError(
                 f"'{rotor.name}' runs away: its torque grows with its rate.",
                 f"instruments.{rotor.name}.a4",
                 "Give a coefficient a4 of at most one.",
             )
-        self.rotors[rotor.name] = (y, turned, length)
+        self.rotors[rotor.name] = (y, turned, rotor.calibration_distance)
+
+    def _axes_key(self, rotor: Cup | Propeller) -> Hashable:
+        """What the wind in a rotor's axes depends on."""
+        if isinstance(rotor, Cup):
+            return self._winds.key(rotor)
+        if rotor.mounted_on:
+            lean = self._station.instrument(rotor.mounted_on).tilt_deg
+            carried = (self._keys[rotor.mounted_on], rotor.distance_to_vane_axis)
+            return self._winds.key(rotor, lean), carried
+        return self._winds.key(rotor), repr(rotor.axis)
+
+    def _axes(self, rotor: Cup | Propeller) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Wind in a rotor's axes."""
+        if isinstance(rotor, Cup):
+            return cup_axes(self._winds.flow(rotor).wind)
+        if rotor.mounted_on:
+            carrier = self._station.instrument(rotor.mounted_on)
+            flow = self._winds.flow(rotor, carrier.tilt_deg)
+            phi, rate = self.angles[carrier.name]
+            return propeller_vane_axes(
+                flow.wind, phi, rate + flow.turning[:, 2], rotor.distance_to_vane_axis
+            )
+        return _fixed_axes(rotor, self._winds.flow(rotor))
+
+    def _rotated(
+        self, rotor: Cup | Propeller, parameters: RotorParameters, start: tuple[float, float]
+    ) -> tuple[FloatArray, FloatArray]:
+        axial, transverse, lateral = self._axes(rotor)
+        temperature = self._drive.temperature
+        if temperature is None:
+            temperature = np.full(axial.shape, rotor.reference_temperature)
+        rate, psi = start
+        return integrate_rotor(
+            parameters, axial, transverse, lateral, self._density_ratio(rotor.reference_density),
+            temperature, self._drive.dt, self._nodes[rotor.name],
+            rate * rotor.calibration_distance, psi,
+        )  # fmt: skip
 
 
 def _fixed_axes(propeller: Propeller, flow: Flow) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -6,6 +6,7 @@ mount, lean of the axis.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from wind_sensors.motion.downwash import rotor_downwash
 from wind_sensors.motion.platform_errors import true_motion
 from wind_sensors.motion.platform_track import Motion
 from wind_sensors.simulation.drive import Drive
+from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.station.model import (
     Angle,
     Downwash,
@@ -88,33 +90,50 @@ def axis_rotation(tilt_deg: tuple[float, float]) -> FloatArray:
     return rotations.matrix(rotations.from_rotation_vector((-towards_y, towards_x, 0.0)))
 
 
+def _weighs(instrument: Instrument) -> bool:
+    """Whether gravity turns an instrument."""
+    return isinstance(instrument, Angle) and instrument.imbalance != 0.0
+
+
 class WindAtSensors:
     """The flow at each instrument of a station in one drive; nothing is computed twice.
 
     Args:
         station: The station, without changes.
         drive: What drives it.
+        memory: What is known of other stations in the drive; None: nothing.
+        part: First and last instant of the drive within that of the memory.
     """
 
-    def __init__(self, station: Station, drive: Drive) -> None:
+    def __init__(
+        self,
+        station: Station,
+        drive: Drive,
+        memory: DriveMemory | None = None,
+        part: tuple[int, int] = (0, 0),
+    ) -> None:
         self._station = station
         self._drive = drive
-        self._platform = station.platform if drive.motion is not None else None
-        self._motion: Motion | None = None
+        self._memory = DriveMemory(drive) if memory is None else memory
+        self._carrier = (part, repr(station.platform))
+        self._platform: Platform | None = None
         if drive.motion is not None:
-            platform = station.platform or Platform()
-            self._platform = platform
-            self._motion = (
-                drive.motion
-                if drive.motion_is_true
-                else true_motion(platform, drive.motion, drive.dt, drive.elapsed)
-            )
-            self._rotation = relative_wind.sensor_rotation(platform)
+            self._platform = station.platform or Platform()
+            self._rotation = relative_wind.sensor_rotation(self._platform)
         else:
             heading = np.radians(station.sensor_heading_deg)
             self._rotation = rotations.matrix(rotations.from_roll_pitch_yaw(0.0, 0.0, heading))
-        self._flows: dict[tuple[object, ...], Flow] = {}
-        self._winds: dict[tuple[object, ...], FloatArray] = {}
+
+    @property
+    def _motion(self) -> Motion | None:
+        """What the mount does in truth; None on a mast."""
+        reported, platform = self._drive.motion, self._platform
+        if reported is None or platform is None or self._drive.motion_is_true:
+            return reported
+        return self._memory.flows.of(
+            ("motion", self._carrier),
+            lambda: true_motion(platform, reported, self._drive.dt, self._drive.elapsed),
+        )
 
     def flow(self, instrument: Instrument, lean: tuple[float, float] = (0.0, 0.0)) -> Flow:
         """The flow at an instrument.
@@ -124,13 +143,17 @@ class WindAtSensors:
             lean: Tilt of what carries the instrument [deg], added to its own.
         """
         tilt = (instrument.tilt_deg[0] + lean[0], instrument.tilt_deg[1] + lean[1])
-        weighs = isinstance(instrument, Angle) and instrument.imbalance != 0.0
-        key = (
-            instrument.position, instrument.wake_shadows, instrument.flow_distortion, tilt, weighs,
-        )  # fmt: skip
-        if key not in self._flows:
-            self._flows[key] = self._computed(instrument, tilt, weighs)
-        return self._flows[key]
+        return self._memory.flows.of(
+            self.key(instrument, lean),
+            lambda: self._computed(instrument, tilt, _weighs(instrument)),
+        )
+
+    def key(self, instrument: Instrument, lean: tuple[float, float] = (0.0, 0.0)) -> Hashable:
+        """What the flow at an instrument depends on."""
+        tilt = (instrument.tilt_deg[0] + lean[0], instrument.tilt_deg[1] + lean[1])
+        own = (instrument.position, instrument.wake_shadows, instrument.flow_distortion)
+        heading = self._station.sensor_heading_deg
+        return self._carrier, heading, repr(own), tilt, _weighs(instrument)
 
     def _lever_arm(self, position: tuple[float, float, float]) -> FloatArray:
         """The instrument's place in platform axes [m]."""
@@ -143,16 +166,22 @@ class WindAtSensors:
         motion, platform = self._motion, self._platform
         if motion is None or platform is None:
             return self._drive.wind
-        key = (position,)
-        if key not in self._winds:
-            felt = np.einsum("nji,nj->ni", motion.to_earth, self._drive.wind)
-            if platform.velocity_share != 0.0:
-                moving = relative_wind.sensor_velocity(motion, self._lever_arm(position))
-                felt = felt - platform.velocity_share * moving
-            if platform.downwash != Downwash():
-                felt = felt + rotor_downwash(platform.downwash, felt)
-            self._winds[key] = felt
-        return self._winds[key]
+        return self._memory.flows.of(
+            ("felt", self._carrier, repr(position)),
+            lambda: self._felt(motion, platform, position),
+        )
+
+    def _felt(
+        self, motion: Motion, platform: Platform, position: tuple[float, float, float]
+    ) -> FloatArray:
+        """Wind against a moving mount in platform axes [m/s], shape (n, 3)."""
+        felt: FloatArray = np.einsum("nji,nj->ni", motion.to_earth, self._drive.wind)
+        if platform.velocity_share != 0.0:
+            moving = relative_wind.sensor_velocity(motion, self._lever_arm(position))
+            felt = felt - platform.velocity_share * moving
+        if platform.downwash != Downwash():
+            felt = felt + rotor_downwash(platform.downwash, felt)
+        return felt
 
     def _computed(self, instrument: Instrument, tilt: tuple[float, float], weighs: bool) -> Flow:
         wind = self._in_platform_axes(instrument.position)
@@ -170,8 +199,9 @@ class WindAtSensors:
         count = wind.shape[0]
         turning = np.zeros((count, 3))
         gravity = np.zeros((count, 3))
-        if self._motion is not None:
-            turning = self._motion.angular_rate @ to_platform
+        motion = self._motion
+        if motion is not None:
+            turning = motion.angular_rate @ to_platform
         if weighs:
             gravity = self._gravity(instrument, count) @ to_platform
         if tilt != (0.0, 0.0):
@@ -181,7 +211,8 @@ class WindAtSensors:
 
     def _gravity(self, instrument: Instrument, count: int) -> FloatArray:
         """Gravity minus the instrument's acceleration in platform axes [m/s^2], shape (n, 3)."""
-        if self._motion is None:
+        motion = self._motion
+        if motion is None:
             return np.tile((0.0, 0.0, -relative_wind.STANDARD_GRAVITY), (count, 1))
         arm = self._lever_arm(instrument.position)
-        return relative_wind.felt_gravity(self._motion, arm, self._drive.dt)
+        return relative_wind.felt_gravity(motion, arm, self._drive.dt)

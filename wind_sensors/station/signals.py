@@ -62,7 +62,8 @@ def erratic(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
     out = np.zeros(time.size, dtype=np.bool_)
     if time.size < 2:
         return out
-    step = np.abs(np.angle(np.exp(1j * np.diff(angle))))
+    step = np.diff(angle)
+    step = np.abs(step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)))
     jump = np.flatnonzero((step > least) & (np.diff(time) <= ERRATIC_INTERVAL))
     if jump.size == 0:
         return out
