@@ -76,10 +76,10 @@ CALIBRATION_OFFSET = Effect(
 )
 
 
-LULL = 4.0
+LULL = 3.0
 """Wind speed [m/s] below which a braked rotor may come to rest."""
 
-LULLS = 0.02
+LULLS = 0.05
 """Share of the record that a rotor must spend there to show when it lets go."""
 
 
