@@ -59,6 +59,26 @@ def test_order_of_arrival_and_doubles_do_not_change_a_bit(
     assert sum(doubled) == 300
 
 
+def in_bursts(stream: list, longest: float) -> list:
+    """The stream as a listener that fell behind takes it: input by input, a stretch at a time."""
+    return sorted(stream, key=lambda m: (m[2] // round(longest * 1e9), m[1], m[2]))
+
+
+def test_bursts_of_one_input_within_the_reordering_window_do_not_change_a_bit(
+    recording: Recording,
+) -> None:
+    settings = EstimatorSettings(window=20.0, reordering_window=1.0)
+    stream = messages(recording)
+    _, straight = run(stream, settings)
+    estimator, burst = run(in_bursts(stream, 1.0), settings)
+    assert same(straight, burst)
+    assert all(item(estimator, name).values["late"] == "0" for name in ("cup", "vane"))
+    # Longer ones look like a clock that jumps: what a simulation that waits must not let happen.
+    estimator, torn = run(in_bursts(stream, 5.0), settings)
+    assert not same(straight, torn)
+    assert int(item(estimator, "clock").values["jumps"]) > 0
+
+
 def test_a_stream_taken_piece_by_piece_equals_the_recording_at_once(recording: Recording) -> None:
     estimator = make_estimator(mast(), SETTINGS)
     estimates, windows = [], []

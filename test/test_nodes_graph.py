@@ -44,7 +44,10 @@ def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 class LiveRun:
     """A simulated station, its estimator and a recorder, run to the end of the simulation."""
 
-    def __init__(self, graph: Graph, folder: Path, station: str, **simulation: Any) -> None:
+    def __init__(
+        self, graph: Graph, folder: Path, station: str, *, waits: bool = False, **simulation: Any
+    ) -> None:
+        self.settings = EstimatorSettings(reordering_window=1.0 if waits else 0.2)
         listener = graph.listener()
         self.wind = graph.listen(listener, TwistWithCovarianceStamped, "/wind")
         self.diagnostics = graph.listen(listener, DiagnosticArray, "/diagnostics")
@@ -54,6 +57,7 @@ class LiveRun:
             folder=folder,
             topics=station_topics(loaded),
             station=loaded,
+            receipts_for=[*raw_topics(loaded), TRUTH_TOPIC] if waits else (),
             parameter_overrides=overrides(use_sim_time=True),
         )
         self.estimator = graph.add(
@@ -65,24 +69,30 @@ class LiveRun:
                 reliable_inputs=True,
                 input_depth=20_000,
                 diagnostics_period=0.1,
+                reordering_window=self.settings.reordering_window,
+                send_receipts=waits,
+                silence=600.0 if waits else 2.0,
                 **{"qos_overrides./wind.publisher.depth": 1000},
             ),
         )
         self.simulator = graph.add(
             SimulatorNode,
             parameter_overrides=overrides(
-                station=station,
-                duration=DURATION,
-                speed=SPEED,
-                publish_clock=True,
-                publish_truth=True,
-                wait_for_subscribers=2,
-                output_depth=20_000,
-                seed=SEED,
-                **simulation,
+                **{
+                    "station": station,
+                    "duration": DURATION,
+                    "speed": SPEED,
+                    "publish_clock": True,
+                    "publish_truth": True,
+                    "wait_for_subscribers": 2,
+                    "wait_for_receipts": 2 if waits else 0,
+                    "output_depth": 20_000,
+                    "seed": SEED,
+                    **simulation,
+                }
             ),
         )
-        graph.spin(lambda: self.simulator.finished)
+        graph.spin(lambda: self.simulator.finished, 300.0)
         raw = [self.recorder.resolve_topic_name(t) for t in [*raw_topics(loaded), TRUTH_TOPIC]]
         counts = self.recorder.counts
         graph.spin(lambda: sum(counts[t] for t in raw) == self.simulator.published)
@@ -100,9 +110,9 @@ class LiveRun:
 
     def assert_live_equals_offline(self) -> None:
         """The bag gives the numbers that went over DDS, to the last bit."""
-        offline = process(self.recording, EstimatorSettings())
+        offline = process(self.recording, self.settings)
         time, velocity, covariance = stamps_and_velocities(self.wind)
-        assert len(time) > 0.9 * DURATION * EstimatorSettings().output_rate
+        assert len(time) > 0.9 * DURATION * self.settings.output_rate
         np.testing.assert_array_equal(time, offline.time)
         np.testing.assert_array_equal(velocity, offline.velocity)
         np.testing.assert_array_equal(covariance, offline.covariance)
@@ -121,6 +131,15 @@ def _offline_simulation(station_name: str, start: int) -> Recording:
 def test_live_equals_offline_to_the_bit(graph: Graph, tmp_path: Path, station: str) -> None:
     run = LiveRun(graph, tmp_path / "recording", station)
     run.assert_live_equals_offline()
+
+
+def test_listeners_that_cannot_follow_make_the_run_slower_and_not_different(
+    graph: Graph, tmp_path: Path
+) -> None:
+    run = LiveRun(graph, tmp_path / "recording", "mast_cup_vane", waits=True, speed=1000.0)
+    run.assert_live_equals_offline()
+    assert values(run.status("clock"))["jumps"] == "0"
+    assert values(run.status("vane"))["late"] == "0"
 
 
 def test_live_signals_are_those_of_an_offline_simulation(graph: Graph, tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from wind_sensors.nodes.mounting import MountingFromTf, SensorPose, tf2_is_insta
 from wind_sensors.nodes.outputs import TOPICS, WindPublishers
 from wind_sensors.nodes.parameters import Parameter, Value, changed, declare, describe, number
 from wind_sensors.nodes.quality import input_quality, subscribe
+from wind_sensors.nodes.receipts import ReceiptSender
 from wind_sensors.nodes.rehearsal import warm_up
 from wind_sensors.nodes.station_parameters import (
     Role,
@@ -107,6 +108,9 @@ class EstimatorNode(Node):
                     depth=int(number(self._values["input_depth"])),
                 ),
             )
+        self._receipts = (
+            ReceiptSender(self, self._received_by_topic) if self._values["send_receipts"] else None
+        )
         wanted = bool(self._values["use_tf"]) and self.station.platform is not None
         self._mounting = MountingFromTf(self) if wanted and tf2_is_installed() else None
         self._updater = Updater(
@@ -128,6 +132,10 @@ class EstimatorNode(Node):
     def received(self) -> int:
         """Raw messages so far."""
         return sum(count.received for count in self._inputs.counts.values())
+
+    def _received_by_topic(self) -> dict[str, int]:
+        counts = self._inputs.counts.items()
+        return {self.resolve_topic_name(topic): count.received for topic, count in counts}
 
     @property
     def last_wind(self) -> str:

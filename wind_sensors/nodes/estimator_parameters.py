@@ -5,6 +5,7 @@ from __future__ import annotations
 from wind_sensors.estimation import METHODS, EstimatorSettings
 from wind_sensors.nodes.parameters import Parameter
 from wind_sensors.nodes.quality import INPUT_DEPTH
+from wind_sensors.nodes.receipts import RECEIPTS_TOPIC
 from wind_sensors.nodes.station_parameters import STATION
 
 _DEFAULTS = EstimatorSettings()
@@ -181,6 +182,12 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         "Raw messages kept for a busy node.",
         minimum=1,
         maximum=1_000_000,
+    ),
+    Parameter(
+        "send_receipts",
+        bool,
+        False,
+        f"Tell on {RECEIPTS_TOPIC} how many raw messages have come, so that a simulator can wait.",
     ),
     Parameter(
         "silence",

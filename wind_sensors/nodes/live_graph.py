@@ -1,7 +1,12 @@
-"""A simulated station and its estimator as processes of their own, recorded over DDS."""
+"""A simulated station and its estimator as processes of their own, recorded over DDS.
+
+The simulator waits for receipts of estimator and recorder, so that a busy machine makes the run
+slower instead of different.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -19,17 +24,28 @@ from wind_sensors.recordings import load_station
 from wind_sensors.simulation.run import recording_start
 
 if TYPE_CHECKING:
+    from wind_sensors.estimation import EstimatorSettings
     from wind_sensors.nodes.recorder import RecorderNode
 
 _DOMAIN = 40
-_DEEP = 100_000
-_PATIENCE = 300.0
+_FASTEST = 100.0
+"""No topic carries more messages a simulated second than this."""
+
+_DEEPEST = 1_000_000
+_PATIENCE = 1200.0
 """Longest wait for the first message: kernels may have to be compiled first [s]."""
 
 _QUIET = 2.5
-"""Silence that ends the recording [s]."""
+"""Silence that ends the recording once the last estimates have come [s]."""
 
-_BURST = {f"qos_overrides./{t}.publisher.depth": 1000 for t in ("wind", "wind/apparent")}
+_STALLED = 60.0
+"""Silence after which what is missing will not come any more [s]."""
+
+_LONGEST_SILENCE = 600.0
+"""Of the estimator's own clock [s]: inputs that starve on a busy machine have not ended."""
+
+_CLOSE_TOPICS = ("wind", "wind/apparent", "wind/vector")
+"""Outputs with a message for every estimate."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +65,15 @@ class LiveRun:
 
 @dataclass
 class _Watch:
-    """Sees the messages come and notices when no more do."""
+    """Sees the messages come and notices when no more do.
+
+    Args:
+        processes: By node.
+        estimates: So many must have come before a short silence means the end.
+    """
 
     processes: Mapping[str, subprocess.Popen[bytes]]
+    estimates: int
     begin: float = field(default_factory=time.monotonic)
     first: float | None = None
     last: float = 0.0
@@ -59,7 +81,7 @@ class _Watch:
     over: bool = False
 
     def is_over(self, counts: Mapping[str, int]) -> bool:
-        """Whether everything has arrived.
+        """Whether everything has arrived, or nothing will any more.
 
         Raises:
             UserError: A process ended by itself, or nothing ever came.
@@ -75,24 +97,30 @@ class _Watch:
                 raise UserError(f"{name} has ended with status {status}.", "live graph")
         if self.first is None and now - self.begin > _PATIENCE:
             raise UserError("no message has arrived.", "live graph", "See the nodes' messages.")
-        self.over = self.first is not None and now - self.last > _QUIET
+        silence = _QUIET if counts.get("/wind", 0) >= self.estimates else _STALLED
+        self.over = self.first is not None and now - self.last > silence
         return self.over
 
 
 def run_live(
     station_file: str,
     simulation: Mapping[str, object],
-    estimation: Mapping[str, object],
+    settings: EstimatorSettings,
     folder: Path,
+    estimates: int,
     progress: Callable[[int, float], None],
 ) -> LiveRun:
     """Run simulator and estimator as processes and record everything they publish.
 
+    Simulated time never goes further ahead of estimator or recorder than the estimator's
+    reordering window, so that the messages' order is kept however slowly they follow.
+
     Args:
         station_file: Station file with a cup, a vane and the recording's start.
         simulation: Parameters of the simulator, with `duration` and `speed`.
-        estimation: Parameters of the estimator.
+        settings: Of the estimator.
         folder: Recording to write; replaced if it is one.
+        estimates: So many are expected at least; a recording with fewer is waited for longer.
         progress: Called with the number of messages recorded so far and the simulated time [s].
 
     Raises:
@@ -102,38 +130,31 @@ def run_live(
     os.environ["ROS_DOMAIN_ID"] = str(_DOMAIN + os.getpid() % 60)
     station = load_station(station_file)
     begin = recording_start(station)
-    common = {"station": station_file}
-    estimator = _start(
-        "cup_vane_node",
-        {
-            **common,
-            **estimation,
-            "use_sim_time": True,
-            "reliable_inputs": True,
-            "input_depth": _DEEP,
-            **_BURST,
-        },
-    )
+    # Queues hold the whole run: whoever falls behind gets everything later, and nothing is dropped.
+    depth = min(round(_FASTEST * float(str(simulation["duration"]))), _DEEPEST)
+    estimator = _start("cup_vane_node", _estimator_parameters(station_file, settings, depth))
     simulator = _start(
         "sim_node",
         {
-            **common,
+            "station": station_file,
             **simulation,
             "publish_clock": True,
             "publish_truth": True,
             "wait_for_subscribers": 2,
-            "output_depth": _DEEP,
+            "wait_for_receipts": 2,
+            "longest_lead": settings.reordering_window,
+            "output_depth": depth,
         },
     )
     processes = {"cup_vane_node": estimator, "sim_node": simulator}
-    watch = _Watch(processes)
+    watch = _Watch(processes, estimates)
     made: list[RecorderNode] = []
 
     def build() -> list[RecorderNode]:
         from rclpy.parameter import Parameter
 
         from wind_sensors.nodes.recorder import RecorderNode
-        from wind_sensors.nodes.topics import station_topics
+        from wind_sensors.nodes.topics import TRUTH_TOPIC, raw_topics, station_topics
 
         made.append(
             RecorderNode(
@@ -141,6 +162,8 @@ def run_live(
                 station_topics(station),
                 station,
                 force=True,
+                depth=depth,
+                receipts_for=[*raw_topics(station), TRUTH_TOPIC],
                 parameter_overrides=[Parameter("use_sim_time", value=True)],
             )
         )
@@ -158,6 +181,22 @@ def run_live(
     if not watch.over:
         raise KeyboardInterrupt
     return LiveRun(watch.last - (watch.first or watch.last), dict(made[0].counts), codes)
+
+
+def _estimator_parameters(
+    station_file: str, settings: EstimatorSettings, depth: int
+) -> dict[str, object]:
+    """Of a node that loses nothing and is moved by its messages' stamps alone."""
+    return {
+        "station": station_file,
+        **dataclasses.asdict(settings),
+        "use_sim_time": True,
+        "reliable_inputs": True,
+        "input_depth": depth,
+        "send_receipts": True,
+        "silence": _LONGEST_SILENCE,
+        **{f"qos_overrides./{topic}.publisher.depth": depth for topic in _CLOSE_TOPICS},
+    }
 
 
 def _start(node: str, parameters: Mapping[str, object]) -> subprocess.Popen[bytes]:

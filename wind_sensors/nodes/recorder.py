@@ -14,6 +14,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import message_class
 from wind_sensors.nodes.quality import input_quality, subscribe
+from wind_sensors.nodes.receipts import ReceiptSender
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.writing import clear_target
@@ -40,6 +41,8 @@ class RecorderNode(Node):
         topics: Topics to record; None records every topic of the graph but /clock and ROS's own.
         station: Written as the recording's station file; None: the folder holds a bag alone.
         force: Replace a recording that is there.
+        depth: Messages kept by topic while the recorder is busy.
+        receipts_for: Topics of which it tells how many it has had, so that a simulator can wait.
         options: Further arguments of rclpy's Node.
 
     Attributes:
@@ -57,11 +60,14 @@ class RecorderNode(Node):
         station: Station | None = None,
         *,
         force: bool = False,
+        depth: int = _DEPTH,
+        receipts_for: Collection[str] = (),
         **options: Any,
     ) -> None:
         super().__init__("recorder", **options)
         self.counts: dict[str, int] = {}
         self.refused: dict[str, str] = {}
+        self._depth = depth
         self._types = typestore()
         self._wanted = (
             None if topics is None else {self.resolve_topic_name(topic): topic for topic in topics}
@@ -69,6 +75,12 @@ class RecorderNode(Node):
         self._folder = Path(folder)
         self._writer = _open_bag(self._folder, station, force=force)
         self._closed = False
+        acknowledged = [self.resolve_topic_name(topic) for topic in receipts_for]
+        self._receipts = (
+            ReceiptSender(self, lambda: {t: self.counts.get(t, 0) for t in acknowledged})
+            if acknowledged
+            else None
+        )
         self._discovery = self.create_timer(
             _DISCOVERY_PERIOD, self.discover, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -108,7 +120,7 @@ class RecorderNode(Node):
             loaded,
             topic,
             self._keeper(topic, connection),
-            input_quality(reliable=reliable, depth=_DEPTH),
+            input_quality(reliable=reliable, depth=self._depth),
             raw=True,
         )
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
@@ -17,7 +18,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.outputs import stamp
 from wind_sensors.nodes.parameters import Parameter, declare, describe, number
-from wind_sensors.nodes.quality import SETTLING, advertise, output_quality
+from wind_sensors.nodes.quality import SETTLING, advertise, input_quality, output_quality, subscribe
+from wind_sensors.nodes.receipts import RECEIPTS_DEPTH, RECEIPTS_TOPIC, ReceiptBook
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.nodes.signal_messages import SignalEncoder
 from wind_sensors.nodes.station_parameters import (
@@ -72,6 +74,25 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         minimum=0,
         maximum=100,
     ),
+    Parameter(
+        "wait_for_receipts",
+        int,
+        0,
+        f"So many listeners tell on {RECEIPTS_TOPIC} what they have had (nodes with "
+        "send_receipts); simulated time stands still rather than go further than longest_lead "
+        "ahead of the slowest. 0: it waits for nobody.",
+        minimum=0,
+        maximum=100,
+    ),
+    Parameter(
+        "longest_lead",
+        float,
+        1.0,
+        "How far simulated time may go ahead of a listener that is waited for [s]; not more than "
+        "the listener's reordering_window, or a busy one may lose its messages' order.",
+        minimum=0.01,
+        maximum=60.0,
+    ),
     Parameter("frame_id", str, "map", "Frame of earth-fixed vectors: east, north, up."),
     Parameter(
         "output_depth",
@@ -118,6 +139,8 @@ class SimulatorNode(Node):
         self.finished = False
         self._speed = number(values["speed"])
         self._waits_for = int(number(values["wait_for_subscribers"]))
+        self._book = ReceiptBook(int(number(values["wait_for_receipts"])))
+        self._longest_lead = number(values["longest_lead"])
         self._with_clock = bool(values["publish_clock"])
         self._duration = number(values["duration"]) or math.inf
         self._scenario = scenario_of(values, self.station)
@@ -133,9 +156,13 @@ class SimulatorNode(Node):
             for topic, message_type in encoder.topics.items()
         }
         self._counts = dict.fromkeys(encoder.topics, 0)
+        self._resolved = {topic: self.resolve_topic_name(topic) for topic in encoder.topics}
         self._clock_outlet = (
             advertise(self, ClockMessage, "/clock", output_quality(1)) if self._with_clock else None
         )
+        if values["wait_for_receipts"]:
+            quality = input_quality(reliable=True, depth=RECEIPTS_DEPTH)
+            subscribe(self, DiagnosticStatus, RECEIPTS_TOPIC, self._book.note_received, quality)
         self._clock_period = max(round(_CLOCK_WALL_PERIOD * self._speed), 1)
         self._next_clock = 0
         # A first look compiles the kernels, which must not delay the stream once it runs.
@@ -164,7 +191,7 @@ class SimulatorNode(Node):
 
     def published_by_topic(self) -> dict[str, int]:
         """Messages so far by resolved topic."""
-        return {self.resolve_topic_name(topic): n for topic, n in self._counts.items()}
+        return {self._resolved[topic]: n for topic, n in self._counts.items()}
 
     def _tick(self) -> None:
         if self.finished or not self._has_started():
@@ -181,6 +208,7 @@ class SimulatorNode(Node):
                 self._counts[topic] += 1
             self._next_event = next(self._events)
         self._tell_time(now)
+        self._book.note_sent(self._elapsed, self.published_by_topic())
         self._burst = time.monotonic() - wall
         if self._elapsed >= self._duration:
             self.finished = True
@@ -192,13 +220,14 @@ class SimulatorNode(Node):
         if self._with_clock:
             # Simulated time may go slowly on a busy machine, but it must not leap.
             passed = min(passed, _LONGEST_LEAP)
-        self._elapsed = min(self._elapsed + passed * self._speed, self._duration)
+        furthest = min(self._duration, self._book.complete_until + self._longest_lead)
+        self._elapsed = min(self._elapsed + passed * self._speed, furthest)
         self._ticked_at = wall
         return wall
 
     def _has_started(self) -> bool:
         if not self._running:
-            if self._lonely_topics():
+            if self._lonely_topics() or not self._book.is_open:
                 self._ready_at = time.monotonic() + SETTLING
             elif time.monotonic() >= self._ready_at:
                 self._start()
@@ -207,9 +236,14 @@ class SimulatorNode(Node):
     def _lonely_topics(self) -> list[str]:
         return sorted(
             topic
-            for topic in self._instrument_topics
-            if self._outlets[topic].get_subscription_count() < self._waits_for
+            for topic, outlet in self._outlets.items()
+            if outlet.get_subscription_count() < self._least_subscribers(topic)
         )
+
+    def _least_subscribers(self, topic: str) -> int:
+        named = self._waits_for if topic in self._instrument_topics else 0
+        # A listener that has not been matched yet would wait for the first messages without end.
+        return max(named, self._book.listeners_of(self._resolved[topic]))
 
     def _start(self) -> None:
         stated = recording_start(self.station) if self._with_clock else 0
@@ -234,9 +268,11 @@ class SimulatorNode(Node):
             "messages": str(self.published),
             "speed": f"{self._speed:g}",
             "time spent in the last burst": f"{self._burst * 1e3:.1f} ms",
+            "behind": ", ".join(self._book.late_listeners) or "nobody",
         }
         if not self._running:
-            text = f"Waiting for subscribers of {', '.join(self._lonely_topics())}."
+            awaited = self._lonely_topics() or [RECEIPTS_TOPIC]
+            text = f"Waiting for listeners of {', '.join(awaited)}."
             yield Status("simulation", Level.WARN, text, details)
         elif self.finished:
             yield Status("simulation", Level.OK, "The simulation has ended.", details)

@@ -6,7 +6,8 @@ from html import escape
 from typing import NamedTuple
 
 from wind_sensors.report.demo_figures import NARROW, WIDE, Drawing, as_svg, biases, gust, spectra
-from wind_sensors.report.demo_results import Agreement, DemoResults, WindowComparison
+from wind_sensors.report.demo_results import DemoResults, WindowComparison
+from wind_sensors.report.live_agreement import Agreement, shortfalls
 
 
 class Circumstances(NamedTuple):
@@ -198,12 +199,13 @@ def _live_section(agreement: Agreement | None, run: Circumstances) -> str:
         if agreement.is_exact
         else f"The largest difference is {agreement.largest_difference:.3g}"
     )
+    same = agreement.is_exact and agreement.is_complete
     return _section(
-        "Live and offline are the same numbers",
+        "Live and offline are the same numbers" if same else "Live and offline",
         f"{names} ran as separate processes and talked over DDS, {speed:.0f} times as fast as "
         f"real time; {run.messages:,} messages were recorded. Then the bag was processed "
         f"offline. {verdict} in {agreement.compared:,} estimates with their covariances and "
         f"{agreement.windows_compared} window means. {agreement.only_offline} further estimates "
         "were not final yet when the live run ended.",
-        "",
+        "".join(f"<p class='raw'>{escape(s)}</p>" for s in shortfalls(agreement, speed)),
     )

@@ -1,18 +1,14 @@
-"""What the demo has to show: the estimate against the truth, live against offline, biases."""
+"""What the demo has to show: the estimate against the truth, and biases."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import norm
 
 from wind_sensors.estimation.outputs import ProcessedRecording, WindowStatistics
-from wind_sensors.recordings.bag import read_bag
-from wind_sensors.recordings.fields import columns, stamps
-from wind_sensors.recordings.reading import BAG_FOLDER
-from wind_sensors.station.inputs import FieldPath
+from wind_sensors.report.live_agreement import Agreement
 from wind_sensors.station.signals import FloatArray, TimeArray, Winds
 
 _SETTLING_SECONDS = 20.0
@@ -22,30 +18,6 @@ _MEAN_TERMS = ("u", "v", "w", "vane_lag", "translation")
 """Terms that make up the bias of a count mean against the vector mean."""
 
 _EDGES_OF_90_PERCENT = float(norm.ppf(0.95))
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """Live messages against offline results.
-
-    Attributes:
-        compared: Estimates that both have.
-        only_offline: Estimates that were not final when the live run ended.
-        largest_difference: Of any component of velocity or covariance; 0 means to the last bit.
-        windows_compared: Averaging windows that both have.
-        largest_window_difference: Of their vector means [m/s].
-    """
-
-    compared: int
-    only_offline: int
-    largest_difference: float
-    windows_compared: int
-    largest_window_difference: float
-
-    @property
-    def is_exact(self) -> bool:
-        """Not one bit differs."""
-        return self.largest_difference == 0.0 and self.largest_window_difference == 0.0
 
 
 @dataclass(frozen=True)
@@ -133,42 +105,6 @@ def demo_results(
         terms=_mean_terms(corrected.windows),
         agreement=agreement,
     )
-
-
-def live_agreement(folder: Path, offline: ProcessedRecording) -> Agreement:
-    """The `wind` and `wind/mean` messages of a live recording against offline results."""
-    topics = read_bag(folder / BAG_FOLDER)
-    vector: list[FieldPath] = [("twist", "twist", "linear", axis) for axis in "xyz"]
-    covariance: list[FieldPath] = [
-        ("twist", "covariance", 6 * row + column) for row in range(3) for column in range(3)
-    ]
-
-    def read(topic: str) -> tuple[TimeArray, FloatArray]:
-        data = topics.topics[topic]
-        time = stamps(data.raw, topics.types, data.message_type, ("header", "stamp"))
-        paths = [*vector, *covariance]
-        values = columns(data.raw, topics.types, data.message_type, paths)
-        return time, np.stack(values, axis=1)
-
-    flat = offline.covariance.reshape(len(offline.time), 9)
-    wind = _difference(*read("/wind"), offline.time, np.hstack((offline.velocity, flat)))
-    stops = np.array([window.stop for window in offline.windows], dtype=np.int64)
-    means = np.array(
-        [np.append(w.vector_mean, w.vector_mean_covariance.ravel()) for w in offline.windows]
-    )
-    mean = _difference(*read("/wind/mean"), stops, means)
-    return Agreement(wind[0], len(offline.time) - wind[0], wind[1], *mean)
-
-
-def _difference(
-    live_time: TimeArray, live: FloatArray, time: TimeArray, values: FloatArray
-) -> tuple[int, float]:
-    """Number of live messages and their largest difference; inf where a stamp has no partner."""
-    places = np.searchsorted(time, live_time)
-    paired = places < len(time)
-    if not len(live_time) or not paired.all() or (time[places] != live_time).any():
-        return len(live_time), float("inf")
-    return len(live_time), float(np.max(np.abs(live - values[places])))
 
 
 def _compared(window: WindowStatistics, truth: Winds, begin: int) -> WindowComparison:
