@@ -60,6 +60,10 @@ CLOSE_START = 0.05
 """A second starting point is tried if its deviance lies within this share of the number of data
 of the best one's."""
 
+LARGER_STARTS = (2.0, 4.0)
+"""Multiples of the linear estimate that are tried as well: a vane that turns round on the way makes
+valleys in the cost from which a small effect does not come out."""
+
 PENALTY_PER_PARAMETER = 3.0
 """Cost of one more parameter, in units of the squared white vector."""
 
@@ -68,6 +72,16 @@ PENALTY_PER_FURTHER_PARAMETER = 4.0
 
 PENALTY_PER_INTERVAL = 10.0
 """Cost of a beginning or an end inside the record."""
+
+
+def _enlarged(effect: Effect, values: Mapping[str, float], factor: float) -> dict[str, float]:
+    """Values that depart further from the healthy ones, within their bounds."""
+    out = dict(values)
+    for p in effect.parameters:
+        if p.healthy is not None:
+            moved = p.healthy + factor * (values[p.name] - p.healthy)
+            out[p.name] = float(np.clip(moved, p.low, p.high))
+    return out
 
 
 @dataclass
@@ -197,6 +211,11 @@ class Searcher:
                     Term(effect, score.instrument, {**start, parameter.name: value})
                     for value in parameter.starts
                 )
+            if not any(parameter.starts for parameter in effect.parameters):
+                starts.extend(
+                    Term(effect, score.instrument, _enlarged(effect, start, factor))
+                    for factor in LARGER_STARTS
+                )
             members = groups[(score.effect, score.instrument)]
             power = np.einsum("ij,ij->i", signatures[members], signatures[members])
             seen = signatures[members] @ vector
@@ -206,11 +225,7 @@ class Searcher:
                 for k in order[1:]:
                     template = self.bank.templates[members[int(k)]]
                     amplitude = float(np.clip(seen[k] / max(power[k], 1e-9), 0.3, 10.0))
-                    values = dict(template.values)
-                    for p in effect.parameters:
-                        if p.healthy is not None:
-                            moved = p.healthy + amplitude * (values[p.name] - p.healthy)
-                            values[p.name] = float(np.clip(moved, p.low, p.high))
+                    values = _enlarged(effect, template.values, amplitude)
                     starts.append(Term(effect, score.instrument, values))
             out.append(starts)
         chosen = {starts[0].key for starts in out}

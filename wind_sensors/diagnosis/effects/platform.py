@@ -32,6 +32,10 @@ LEAST_TRAVEL = 0.5
 DEAD_SHORTEST = 60.0
 """A log that is silent for less [s] is not held to be dead."""
 
+MISSING_SHARE = 0.5
+"""Smallest share of the carrier's velocity that counts as not removed; what lacks less is a wrong
+scale."""
+
 SECTORS = 8
 FEWEST_SECTORS = 4
 SHORTEST_VISIT = 0.01
@@ -82,7 +86,7 @@ def _share(entry: Entry, values: Values) -> dict[str, Any]:
 
 def _share_size(values: Values) -> float:
     missing = abs(values["velocity_share"] - 1.0)
-    return max(missing, values.get("position_share", 0.0)) / 0.15
+    return max(missing, values.get("position_share", 0.0)) / MISSING_SHARE
 
 
 PLATFORM_VELOCITY = Effect(
@@ -94,7 +98,8 @@ PLATFORM_VELOCITY = Effect(
     region="with the carrier's speed and heading",
     parameters=(
         Parameter(
-            "velocity_share", "1", -1.0, 2.0, healthy=1.0, minimum=0.15, starts=(0.0,), step=0.02
+            "velocity_share", "1", -1.0, 2.0, healthy=1.0, minimum=MISSING_SHARE,
+            starts=(0.0, 0.5, 1.6), step=0.02,
         ),
         Parameter(
             "position_share", "1", 0.0, 1.0, healthy=0.0, starts=(1.0,), step=0.02,
