@@ -34,12 +34,13 @@ ACCEPTED_FURTHER_GAIN = 32.0
 ACCEPTED_ELSEWHERE_GAIN = 22.0
 """The same for a second effect on signals that the first does not reach."""
 
-FURTHER_SHARE = 0.05
+FURTHER_SHARE = 0.1
 """A further effect on the same signals must also bring this share of the gain so far."""
 
-LARGEST_INEXACTNESS = 500.0
+LARGEST_INEXACTNESS = 1000.0
 """But never more than this."""
 
+FURTHER_EXACT_SHARE = 0.05
 LARGEST_EXACT_INEXACTNESS = 150.0
 """The same beside effects whose form is certain."""
 
@@ -87,10 +88,12 @@ def inexact(current: Fit, nothing: float) -> float:
         current: The explanation so far.
         nothing: Cost without any effect.
     """
-    share = FURTHER_SHARE * (nothing - current.cost)
-    exact = all(term.effect.exact for term in current.terms)
-    largest = LARGEST_EXACT_INEXACTNESS if exact else LARGEST_INEXACTNESS
-    return min(max(share, ACCEPTED_FURTHER_GAIN), largest)
+    gained = nothing - current.cost
+    if all(term.effect.exact for term in current.terms):
+        share, largest = FURTHER_EXACT_SHARE, LARGEST_EXACT_INEXACTNESS
+    else:
+        share, largest = FURTHER_SHARE, LARGEST_INEXACTNESS
+    return min(max(share * gained, ACCEPTED_FURTHER_GAIN), largest)
 
 
 @dataclass(frozen=True)
