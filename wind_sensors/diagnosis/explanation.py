@@ -28,6 +28,13 @@ ACCEPTED_GAIN = 14.0
 LOUDEST_FACTOR = 1.2
 """A name needs this many times what the loudest of the healthy recordings promises."""
 
+PASSING_GAIN = 25.0
+"""What an effect must bring that begins or ends inside the record: any of many may do."""
+
+PASSING_FORM_GAIN = 60.0
+"""The same with several parameters: in a few minutes of wind from a few directions they fit many a
+wandering of the reference with sizes that undo each other."""
+
 ACCEPTED_FURTHER_GAIN = 32.0
 """The same for a second effect on the same signals."""
 
@@ -79,6 +86,14 @@ def needed_gain(current: Fit, loudest: float) -> float:
     """
     least = ACCEPTED_ELSEWHERE_GAIN if current.terms else ACCEPTED_GAIN
     return max(least, LOUDEST_FACTOR * loudest)
+
+
+def passing_gain(term: Term) -> float:
+    """Gain that a term has to bring for its beginning or end inside the record; else nothing."""
+    if term.interval == ALWAYS:
+        return 0.0
+    graded = sum(p.healthy is not None and p.minimum > 0.0 for p in term.effect.parameters)
+    return PASSING_FORM_GAIN if graded > 1 else PASSING_GAIN
 
 
 def inexact(current: Fit, nothing: float) -> float:

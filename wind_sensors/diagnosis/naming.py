@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.explanation import (
     may_join,
     needed_gain,
     no_terms,
+    passing_gain,
     plausible,
     seen_in,
     single_event,
@@ -146,7 +147,10 @@ def _leader(
         if one.evidence > likeliest + CLEARLY_BETTER:
             break
         brings = _brings(searcher, one, current, so_far)
-        least = max(needed, _inexactness(searcher, whitener, current, one.fit.terms[-1]))
+        newest = one.fit.terms[-1]
+        least = max(
+            needed, passing_gain(newest), _inexactness(searcher, whitener, current, newest)
+        )
         if brings >= least and brings > most:
             leader, most = one, brings
             likeliest = min(likeliest, one.evidence)

@@ -211,7 +211,7 @@ class Searcher:
                     Term(effect, score.instrument, {**start, parameter.name: value})
                     for value in parameter.starts
                 )
-            if not any(parameter.starts for parameter in effect.parameters):
+            if len(effect.parameters) == 1 and not effect.parameters[0].starts:
                 starts.extend(
                     Term(effect, score.instrument, _enlarged(effect, start, factor))
                     for factor in LARGER_STARTS
