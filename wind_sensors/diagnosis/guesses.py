@@ -37,6 +37,16 @@ STIFFENINGS = (-0.03, -0.08, -0.16)
 """Squared friction speeds at the mean temperature [m^2/s^2] and coefficients [1/K] to begin with:
 the two make up for each other, so that a search for one at a time gets lost."""
 
+HOLDING_FRICTIONS = (1.2, 1.6, 2.0)
+BREAKAWAYS = (1.5, 2.2, 3.2)
+"""Friction speeds [m/s], and friction at rest relative to that of the turning rotor, to begin with
+where a rotor stands still in the wind: its stops and starts make the cost too rough to search."""
+
+STANDS_STILL = 0.2
+LEAST_HELD = 0.02
+"""Rate [m/s] below which a rotor counts as standing, and share of the record for which a bearing
+that sticks has to hold it."""
+
 BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift", "bearing_friction"})
 """Effects that are tried whether or not the screening sees them."""
 
@@ -83,6 +93,7 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
             rate = simulated.series[channel.name]
             terms = [
                 *_frictions(comparison, entry),
+                *_sticking(comparison, entry, rate),
                 *_pulse_guesses(comparison, station, entry),
                 *_silence(comparison, entry, rate),
             ]
@@ -123,6 +134,28 @@ def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
         )
         for brake in BRAKES
         for coefficient in STIFFENINGS
+    ]  # fmt: skip
+
+
+def _sticking(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:
+    """Bearings that hold a rotor where it should turn, and let it go late.
+
+    Args:
+        comparison: The recording.
+        rotor: Gives the pulses.
+        rate: That of the healthy rotor [m/s], at the bins.
+    """
+    measured = comparison.measured.series[f"{rotor.name}/rotor_rate"]
+    held = (measured < STANDS_STILL) & (rate > _RATE_THAT_TURNS)
+    if np.mean(held) < LEAST_HELD:
+        return []
+    return [
+        _term(
+            "bearing_friction", rotor.name, friction_speed=speed, temperature_coefficient=0.0,
+            breakaway=breakaway,
+        )
+        for speed in HOLDING_FRICTIONS
+        for breakaway in BREAKAWAYS
     ]  # fmt: skip
 
 

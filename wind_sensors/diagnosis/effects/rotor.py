@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
-from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Angle, Cup, Instrument, Platform, Propeller, Rotor, Station
 
 Entry = Instrument | Platform
@@ -76,18 +73,6 @@ CALIBRATION_OFFSET = Effect(
 )
 
 
-LULL = 3.0
-"""Wind speed [m/s] below which a braked rotor may come to rest."""
-
-LULLS = 0.05
-"""Share of the record that a rotor must spend there to show when it lets go."""
-
-
-def _lulls(drive: Drive) -> bool:
-    speed = np.hypot(drive.wind[:, 0], drive.wind[:, 1])
-    return bool(np.mean(speed < LULL) > LULLS)
-
-
 def _friction(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
     return {
@@ -114,9 +99,7 @@ BEARING_FRICTION = Effect(
             "temperature_coefficient", "1/K", -0.4, 0.05, step=0.005, swing=3.0,
             starts=(-0.05, -0.12),
         ),
-        Parameter(
-            "breakaway", "1", 1.0, 5.0, healthy=1.0, step=0.1, starts=(2.0, 3.2), free=_lulls
-        ),
+        Parameter("breakaway", "1", 1.0, 5.0, healthy=1.0, fitted=False),
     ),
     applies=_is_rotor,
     update=_friction,
