@@ -10,8 +10,10 @@ import pytest
 from scipy.signal import lfilter
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.json_output import as_json
 from wind_sensors.diagnosis.learning import learn
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
@@ -164,6 +166,15 @@ def test_a_counter_that_begins_to_lose_what_follows_too_soon() -> None:
     assert [f.term.key for f in found.findings] == [("missed_pulses", "cup")]
     assert found.findings[0].term.values["dead_time"] == pytest.approx(0.013, rel=0.1)
     assert found.findings[0].term.interval[0] == pytest.approx(170.0, abs=25.0)
+
+
+def test_a_rotor_held_still_in_the_wind_suggests_a_bearing_that_sticks() -> None:
+    sticky = {"friction_speed": 2.0, "temperature_coefficient": 0.0, "breakaway": 3.0}
+    station = with_effect(STATION, catalogue()["bearing_friction"], "cup", sticky)
+    for planted, suggested in ((station, True), (STATION, False)):
+        guesses = guesses_of(prepare(recorded(planted, 54, mean=3.5)), STATION)
+        forms = guesses.get(("bearing_friction", "cup"), [])
+        assert any(term.values["breakaway"] > 1.0 for term in forms) == suggested
 
 
 def test_the_json_has_the_stated_shape() -> None:

@@ -93,6 +93,11 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             error = INTERVAL_FACTOR * float(np.hypot(noise, FORM_ERROR * departure))
             place += 1
             if not np.isfinite(error):
+                if not parameter.fitted and departure != 0.0:
+                    # One form of several that were tried: the others are not excluded.
+                    found[parameter.name] = Estimate(
+                        value, parameter.low, parameter.high, parameter.unit
+                    )
                 continue
             found[parameter.name] = Estimate(
                 value,

@@ -72,7 +72,6 @@ def _best_span(found: IntervalGains, shortest: float) -> _Span | None:
     place = np.arange(cuts.size)
     edges = (place[:, None] > 0).astype(int) + (place[None, :] < last)
     long_enough = cuts[None, :] - cuts[:, None] >= shortest
-    long_enough |= (edges == 1) & (cuts[None, :] - cuts[:, None] > 0.5 * shortest)
     net = np.where((edges > 0) & long_enough, found.gains - PENALTY_PER_INTERVAL * edges, -np.inf)
     begin, end = np.unravel_index(int(np.argmax(net)), net.shape)
     if not np.isfinite(net[begin, end]):
