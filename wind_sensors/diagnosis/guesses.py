@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import dead_log
 from wind_sensors.diagnosis.fitting import Interval, Term
+from wind_sensors.diagnosis.intervals import interval_of
 from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import BoolArray, erratic
@@ -76,7 +77,7 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     silent = dead_log(comparison.drive)
     if silent is not None:
         still = _term("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
-        out[still.key] = [replace(still, interval=_holding(comparison, *silent))]
+        out[still.key] = [replace(still, interval=interval_of(comparison, *silent, NEAR_AN_END))]
     leans = [
         _term("axis_tilt", STATION, tilt_x=LEAN * np.cos(towards), tilt_y=LEAN * np.sin(towards))
         for towards in np.arange(8) * np.pi / 4.0
@@ -107,16 +108,6 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
         for term in terms:
             out.setdefault(term.key, []).append(term)
     return out
-
-
-def _holding(comparison: Comparison, begin: float, end: float) -> Interval:
-    """A stretch [s since the first bin] as an interval of the recording."""
-    since = comparison.drive.elapsed
-    length = comparison.grid.n * comparison.grid.dt
-    return (
-        begin + since if begin > NEAR_AN_END else 0.0,
-        None if end > length - NEAR_AN_END else end + since,
-    )
 
 
 def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
@@ -228,7 +219,7 @@ def _dead_times(
         missing = int(np.count_nonzero(usual < 0.97 * shortest))
         # The whole record comes first: a part of it must miss more than all of it does.
         if missing > 0.004 * usual.size and (best is None or missing > best[0]):
-            best = missing, shortest, _holding(comparison, begin, end)
+            best = missing, shortest, interval_of(comparison, begin, end, NEAR_AN_END)
     if best is None:
         return []
     _, shortest, holds = best

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.fitting import Interval
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -35,6 +36,22 @@ class IntervalGains:
     cuts: FloatArray
     gains: FloatArray
     amplitudes: FloatArray
+
+
+def interval_of(comparison: Comparison, begin: float, end: float, near: float) -> Interval:
+    """A stretch [s since the first bin] as an interval of the recording.
+
+    Args:
+        comparison: The recording.
+        begin, end: Of the stretch.
+        near: What begins or ends this close to the record's own ends [s] has no beginning, no end.
+    """
+    since = comparison.drive.elapsed
+    length = comparison.grid.n * comparison.grid.dt
+    return (
+        begin + since if begin > near else 0.0,
+        None if end > length - near else end + since,
+    )
 
 
 def cell_signatures(

@@ -10,7 +10,12 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import plausible, seen_in, total
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit, planted
-from wind_sensors.diagnosis.intervals import IntervalGains, cell_signatures, interval_gains
+from wind_sensors.diagnosis.intervals import (
+    IntervalGains,
+    cell_signatures,
+    interval_gains,
+    interval_of,
+)
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
     Score,
@@ -87,17 +92,6 @@ def _screening_cuts(searcher: Searcher) -> FloatArray:
     return np.append(np.arange(0.0, length - 0.5 * WINDOW_STEP, WINDOW_STEP), length)
 
 
-def _since_start(searcher: Searcher, window: tuple[float, float]) -> Interval:
-    """A window [s since the first bin] as an interval of the recording."""
-    since = searcher.comparison.drive.elapsed
-    length = searcher.comparison.grid.n * searcher.comparison.grid.dt
-    begin, end = window
-    return (
-        begin + since if begin > NEAR_AN_END else 0.0,
-        None if end > length - NEAR_AN_END else end + since,
-    )
-
-
 def window_starts(
     searcher: Searcher, whitener: Whitener, vector: FloatArray, used: set[tuple[str, str]]
 ) -> list[list[Term]]:
@@ -146,7 +140,7 @@ def window_starts(
         score = Score(
             *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)
         )
-        interval = _since_start(searcher, span.window)
+        interval = interval_of(searcher.comparison, *span.window, NEAR_AN_END)
         starts = [Term(effect, key[1], starting_values(score), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
         found.append((span.net, starts))
@@ -185,7 +179,7 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
         )
         if window is None:
             break
-        interval = _since_start(searcher, window)
+        interval = interval_of(searcher.comparison, *window, NEAR_AN_END)
         if interval in (best.terms[-1].interval, ALWAYS):
             continue
         moved = replace(best.terms[-1], interval=interval)
@@ -262,7 +256,8 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
         span = _best_span(gains, SHORTEST_WINDOW)
         if span is None or known.cost - (float(start @ start) - span.net) < ONSET_GAIN:
             continue
-        passing = replace(term, interval=_since_start(searcher, span.window))
+        interval = interval_of(comparison, *span.window, NEAR_AN_END)
+        passing = replace(term, interval=interval)
         trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
         trial = refined_interval(searcher, whitener, trial)
         always = fit(

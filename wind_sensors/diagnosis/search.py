@@ -74,16 +74,6 @@ PENALTY_PER_INTERVAL = 10.0
 """Cost of a beginning or an end inside the record."""
 
 
-def _enlarged(effect: Effect, values: Mapping[str, float], factor: float) -> dict[str, float]:
-    """Values that depart further from the healthy ones, within their bounds."""
-    out = dict(values)
-    for p in effect.parameters:
-        if p.healthy is not None:
-            moved = p.healthy + factor * (values[p.name] - p.healthy)
-            out[p.name] = float(np.clip(moved, p.low, p.high))
-    return out
-
-
 @dataclass
 class Searcher:
     """The state of the search on one recording.
@@ -213,7 +203,7 @@ class Searcher:
                 )
             if len(effect.parameters) == 1 and not effect.parameters[0].starts:
                 starts.extend(
-                    Term(effect, score.instrument, _enlarged(effect, start, factor))
+                    Term(effect, score.instrument, effect.scaled(start, factor))
                     for factor in LARGER_STARTS
                 )
             members = groups[(score.effect, score.instrument)]
@@ -225,7 +215,7 @@ class Searcher:
                 for k in order[1:]:
                     template = self.bank.templates[members[int(k)]]
                     amplitude = float(np.clip(seen[k] / max(power[k], 1e-9), 0.3, 10.0))
-                    values = _enlarged(effect, template.values, amplitude)
+                    values = effect.scaled(template.values, amplitude)
                     starts.append(Term(effect, score.instrument, values))
             out.append(starts)
         chosen = {starts[0].key for starts in out}

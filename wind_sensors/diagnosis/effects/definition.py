@@ -124,6 +124,15 @@ class Effect:
         """Effects travel between processes by their name."""
         return _named, (self.name,)
 
+    def scaled(self, values: Values, factor: float) -> dict[str, float]:
+        """Values with their departure from health multiplied, within their bounds."""
+        out = dict(values)
+        for p in self.parameters:
+            if p.healthy is not None:
+                moved = p.healthy + factor * (values[p.name] - p.healthy)
+                out[p.name] = min(max(moved, p.low), p.high)
+        return out
+
     def relative_size(self, values: Values) -> float:
         """Size of the effect in units of the smallest size worth reporting."""
         if self.size is not None:

@@ -87,7 +87,8 @@ BEARING_FRICTION = Effect(
     meaning="The bearing brakes the rotor with a torque that does not depend on the wind.",
     entrance="response",
     equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 exp(c (T - T0)); "
-    "steady y = U - U_s^2/U; at rest it holds `breakaway` times as much",
+    "steady y = U - U_s^2/U; towards rest the friction rises to `breakaway` times as much, "
+    "as exp(-(y / 1 m/s)^2)",
     source="J80, eqs. (5), (6)",
     region="low speeds; the rotor stalls below U_s",
     occasional=True,

@@ -114,16 +114,6 @@ def _free(effect: Effect, values: Mapping[str, float]) -> int:
     )
 
 
-def _scaled(effect: Effect, values: Mapping[str, float], factor: float) -> dict[str, float]:
-    """Values with their departure from health multiplied."""
-    out = dict(values)
-    for p in effect.parameters:
-        if p.healthy is not None:
-            departed = p.healthy + factor * (values[p.name] - p.healthy)
-            out[p.name] = float(np.clip(departed, p.low, p.high))
-    return out
-
-
 def _cost(snapshots: Sequence[Snapshot], station: Station, template: Template) -> float:
     total = 0.0
     for snapshot in snapshots:
@@ -154,7 +144,7 @@ def _tried(
     effect = score.template.effect
     newest = snapshots[-1:]
     options = [
-        _scaled(effect, start, factor) for start in _starts(score) for factor in _COARSE_SIZES
+        effect.scaled(start, factor) for start in _starts(score) for factor in _COARSE_SIZES
     ]
     costs = [_cost(newest, station, Template(effect, score.instrument, 0, v)) for v in options]
     start = options[int(np.argmin(costs))]
@@ -197,7 +187,7 @@ def candidates(
         for sizes in (_SIZES, _FINE_SIZES):
             around = kept
             for factor in sizes:
-                values = _scaled(effect, around, factor)
+                values = effect.scaled(around, factor)
                 template = Template(effect, score.instrument, 0, values)
                 cost = _cost(snapshots, station, template)
                 if cost < best:
