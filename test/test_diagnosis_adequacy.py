@@ -58,7 +58,7 @@ def test_a_louder_healthy_day_asks_for_more_than_a_small_effect_gives() -> None:
     station = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 0.94})
     recording = recorded(station, 62)
     assert diagnose(recording, baseline()).verdict in {"named", "ambiguous"}
-    loud = replace(baseline(), loudest_gain=1e4)
+    loud = replace(baseline(), loudest={"cup": 1e4})
     assert diagnose(recording, loud).naming.fit.terms == ()
 
 

@@ -7,7 +7,11 @@ from dataclasses import replace
 import pytest
 
 from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline
-from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration
+from wind_sensors.diagnosis.calibrated_range import (
+    is_too_calm,
+    need_calibration,
+    slowest_wind,
+)
 from wind_sensors.diagnosis.comparison import Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import Term
@@ -40,7 +44,7 @@ def test_below_the_calibrated_winds_only_healthy_recordings_help(speed: float, c
     comparison = compared(speed)
     certificates = default_baseline(station())
     assert is_too_calm(comparison, certificates) is calm
-    in_the_same_wind: Baseline = replace(certificates, slowest_wind=0.8 * speed)
+    in_the_same_wind: Baseline = replace(certificates, usual_wind=speed)
     assert not is_too_calm(comparison, in_the_same_wind)
 
 
@@ -50,8 +54,8 @@ def test_healthy_recordings_say_what_is_normal_in_their_winds_only() -> None:
         for k, speed in enumerate((2.0, 8.0))
     ]
     calm, windy = (simulate(station(), scenario) for scenario in scenarios)
-    assert 0.3 < learn([calm]).slowest_wind < 1.0
-    assert 2.5 < learn([windy]).slowest_wind <= CALIBRATED_FROM
+    assert 0.3 < slowest_wind(learn([calm])) < 1.0
+    assert 2.5 < slowest_wind(learn([windy])) <= CALIBRATED_FROM
     assert not is_too_calm(prepare(calm), learn([calm, windy]))
     assert is_too_calm(prepare(calm), learn([windy]))
 

@@ -19,6 +19,9 @@ CALIBRATED_FROM = 4.0
 """Slowest wind of a calibration [m/s] (IEC 61400-12-1). Below it the straight line through the
 calibration is continued to the starting speed, near which it cannot hold."""
 
+LOUD_ELSEWHERE = 0.7
+"""Share that a healthy day counts which is loud in effects of other instruments."""
+
 FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 """Frequencies at which a baseline keeps its curves [Hz]."""
 
@@ -83,10 +86,10 @@ class Baseline:
         means: Amplitude of each template shared by the healthy recordings, by
             `effect|instrument|template number`, in units of the template.
         standing: Scatter of each template's amplitude between them.
-        loudest_gain: Largest drop of the cost, beyond its parameters, that an effect promises in
-            one healthy recording judged by the others.
-        slowest_wind: Down to this wind speed [m/s] healthy recordings or certificates say what is
-            normal.
+        loudest: Largest drop of the cost, beyond its parameters, that an effect of an instrument
+            (or of the `station`, the `platform`) promises in one healthy recording judged by the
+            others.
+        usual_wind: Wind speed [m/s] that healthy recordings exceed nearly all the time.
     """
 
     recordings: tuple[str, ...]
@@ -95,13 +98,21 @@ class Baseline:
     channels: Mapping[str, ChannelBaseline]
     means: Mapping[str, float] = field(default_factory=dict)
     standing: Mapping[str, float] = field(default_factory=dict)
-    loudest_gain: float = 0.0
-    slowest_wind: float = CALIBRATED_FROM
+    loudest: Mapping[str, float] = field(default_factory=dict)
+    usual_wind: float = np.inf
 
     @property
     def calibrated(self) -> bool:
         """Whether healthy recordings stand behind it."""
         return bool(self.recordings)
+
+    def loudness(self, instrument: str) -> float:
+        """What an effect of an instrument promises on the loudest healthy day.
+
+        A day that is loud elsewhere counts in part: what disturbs one signal reaches others.
+        """
+        overall = max(self.loudest.values(), default=0.0)
+        return max(self.loudest.get(instrument, 0.0), LOUD_ELSEWHERE * overall)
 
     def for_station(self, station: Station) -> Baseline:
         """The same baseline for a recording whose station file may say otherwise.
@@ -137,8 +148,8 @@ class Baseline:
             },
             "means": dict(self.means),
             "standing": dict(self.standing),
-            "loudest_gain": self.loudest_gain,
-            "slowest_wind": self.slowest_wind,
+            "loudest": dict(self.loudest),
+            "usual_wind": _listed(np.array([self.usual_wind]))[0],
         }
         return json.dumps(content, indent=1)
 
@@ -161,8 +172,8 @@ class Baseline:
                 },
                 means=content["means"],
                 standing=content["standing"],
-                loudest_gain=content["loudest_gain"],
-                slowest_wind=content["slowest_wind"],
+                loudest=content["loudest"],
+                usual_wind=float(_unlisted([content["usual_wind"]])[0]),
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.fitting import Term
 
@@ -14,18 +14,32 @@ FEWEST_KNOWN = 0.25
 """Share of a record in which that must be known."""
 
 
+REACH = 0.5
+"""Down to this share of their wind, healthy recordings say something of what is normal."""
+
+
+def slowest_wind(baseline: Baseline) -> float:
+    """Wind speed [m/s] below which nothing is known of what is normal."""
+    return min(CALIBRATED_FROM, REACH * baseline.usual_wind)
+
+
+def calm_share(comparison: Comparison, baseline: Baseline) -> float:
+    """Share of a record in winds that neither certificates nor healthy recordings cover."""
+    return float(np.mean(comparison.speed < min(CALIBRATED_FROM, baseline.usual_wind)))
+
+
 def is_too_calm(comparison: Comparison, baseline: Baseline) -> bool:
     """Whether nothing says what is normal in the winds of a record.
 
     Healthy recordings say it for their winds, certificates for the winds of a calibration.
     """
-    return float(np.mean(comparison.speed >= baseline.slowest_wind)) < FEWEST_KNOWN
+    return float(np.mean(comparison.speed >= slowest_wind(baseline))) < FEWEST_KNOWN
 
 
 def too_calm(baseline: Baseline) -> str:
     """Why nothing is said about such a record."""
     return (
-        f"the wind is below {baseline.slowest_wind:.1f} m/s nearly all the time, where "
+        f"the wind is below {slowest_wind(baseline):.1f} m/s nearly all the time, where "
         "calibrations do not reach, and no healthy recording shows what is normal there"
     )
 

@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.explanation import Alternative, Naming
+from wind_sensors.diagnosis.explanation import LOUDEST_FACTOR, Alternative, Naming
 from wind_sensors.diagnosis.findings import Finding
-from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.regions import RegionBank
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
 
 Verdict = Literal["none", "named", "ambiguous", "unknown", "inconclusive"]
 
-LEAST_REMOVED = 0.5
-"""Share of the excess misfit that held-out blocks must lose to an effect that no region shows."""
+LEAST_REMOVED = 0.7
+"""Share of the excess misfit that held-out blocks must lose to what is named."""
 
 REMAINDER_SCORES = {
     "frequency": 60.0,
     "statistic": 45.0,
     "spectrum": 30.0,
-    "time": 28.0,
-    "direction": 28.0,
-    "heading": 28.0,
+    "time": 30.0,
+    "direction": 30.0,
+    "heading": 30.0,
     "speed": 16.0,
-    "all": 20.0,
+    "all": 30.0,
 }
 """Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
 raise the power of a band on healthy days, too; a named effect leaves less than this where its form
@@ -49,9 +54,14 @@ VERY_NOISY = 8.0
 """Noise beyond this many standard deviations of healthy days is physics that a name left out;
 without any name, where a reference of another day may err more, beyond the second."""
 
-MOST_SHARED = 1.25
+MOST_SHARED = 1.5
 """Largest sum of the shares of the misfit that two effects on the same signals explain, each in the
 other's presence."""
+
+LEAST_TOGETHER = 0.4
+LEAST_CHANGE = 30.0
+"""Two effects that change a signal must together change it by this share of the sum of what each
+does, in squares, if that is more than the second."""
 
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
@@ -79,10 +89,13 @@ class Remainder:
     share: float
 
 
-def remainder_of(naming: Naming, bank: RegionBank, comparison: Comparison) -> Remainder:
+def remainder_of(
+    naming: Naming, bank: RegionBank, comparison: Comparison, baseline: Baseline
+) -> Remainder:
     """What is left in the channels that the named effects reach.
 
-    What another instrument shows beside them says nothing against the names.
+    What another instrument shows beside them says nothing against the names, nor does what a
+    healthy day shows as loudly.
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
@@ -93,7 +106,10 @@ def remainder_of(naming: Naming, bank: RegionBank, comparison: Comparison) -> Re
         }
         channels = {c.name for c in comparison.channels if c.instrument in reached}
         scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
-    limits = np.array([REMAINDER_SCORES[r.kind] for r in bank.regions])
+    loudest = {
+        c.name: LOUDEST_FACTOR * baseline.loudness(c.instrument) for c in comparison.channels
+    }
+    limits = np.array([max(REMAINDER_SCORES[r.kind], loudest[r.channel]) for r in bank.regions])
     worst = int(np.argmax(scores / limits))
     left = float(scores[worst])
     share = left / (left + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
@@ -122,11 +138,38 @@ def _patchwork(naming: Naming) -> bool:
     return len(passing) != len(set(passing))
 
 
+def undo_each_other(naming: Naming, station: Station) -> bool:
+    """Whether two effects take back on some instrument most of what each does there.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+    """
+    if len(naming.fit.terms) < 2:
+        return False
+    comparison = naming.whitener.comparison
+    weights = comparison.weights(naming.whitener.trust)
+    without = comparison.simulate(station).flat(comparison.channels)
+
+    def change(terms: Sequence[Term]) -> FloatArray:
+        moved = comparison.simulate(planted(station, terms)).flat(comparison.channels)
+        return np.asarray(np.nan_to_num(moved - without) * weights)
+
+    first, second = naming.fit.terms
+    squares = [change(terms) ** 2 for terms in ((first,), (second,), naming.fit.terms)]
+    n = comparison.coefficients
+    for k in range(len(comparison.channels)):
+        one, other, together = (float(s[k * n : (k + 1) * n].sum()) for s in squares)
+        if one + other > LEAST_CHANGE and together < LEAST_TOGETHER * (one + other):
+            return True
+    return False
+
+
 def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
-    One of them stands out nowhere, or they undo each other: each has to make good what the other
-    does to the same signals.
+    One of them stands out nowhere, or each has to make good what the other does to the same
+    signals.
     """
     own = [f for f in findings if f.proof is not None]
     if len(own) < 2:
@@ -139,10 +182,14 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
 
 
 def borne_out(findings: tuple[Finding, ...]) -> bool:
-    """Whether a region of the data or held-out blocks speak for the findings."""
+    """Whether blocks that were not fitted speak for the findings."""
     proofs = [f.proof for f in findings if f.proof is not None]
-    located = any(f.p < REMAINDER_P for f in findings)
-    return located or not proofs or proofs[0].excess_removed > LEAST_REMOVED
+    return not proofs or proofs[0].excess_removed > LEAST_REMOVED
+
+
+def stands_out(findings: tuple[Finding, ...]) -> bool:
+    """Whether the data show a mismatch where one of the findings acts."""
+    return any(f.p < REMAINDER_P for f in findings)
 
 
 def verdict_of(

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.search import (
@@ -45,11 +46,14 @@ FURTHER_SHARE = 0.1
 """A further effect on the same signals must also bring this share of the gain so far."""
 
 LARGEST_INEXACTNESS = 1000.0
-"""But never more than this."""
+"""But never more than this, or than the least share."""
 
 FURTHER_EXACT_SHARE = 0.05
 LARGEST_EXACT_INEXACTNESS = 150.0
 """The same beside effects whose form is certain."""
+
+LEAST_SHARE_BESIDE = 0.02
+"""What brings less than this share of the gain so far is the form of what brought that."""
 
 EQUAL_SHARE = 0.03
 """Explanations that differ by less than this share of the gain are equal: the simulation is not
@@ -64,33 +68,37 @@ EVENT = 3
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
 
+SMALLEST_BESIDE = 1.8
+"""The same beside another effect on the same signals, whose form a small one may make good."""
+
 
 def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
     """What parameters and intervals cost; a term's second parameter costs more than its first."""
     firsts = min(len(terms), parameters)
     cost = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
     for term in terms:
-        if term.interval != ALWAYS:
+        if term.interval != ALWAYS and not term.effect.legible:
             cost += PENALTY_PER_INTERVAL * sum(
                 (term.interval[0] > 0.0, term.interval[1] is not None)
             )
     return cost
 
 
-def needed_gain(current: Fit, loudest: float) -> float:
-    """Gain that the next term has to bring.
+def needed_gain(current: Fit, further: Term, baseline: Baseline) -> float:
+    """Gain that a further term has to bring.
 
     Args:
         current: The explanation so far.
-        loudest: Largest gain in a healthy recording judged by the others.
+        further: The term.
+        baseline: Knows how loud healthy days are.
     """
     least = ACCEPTED_ELSEWHERE_GAIN if current.terms else ACCEPTED_GAIN
-    return max(least, LOUDEST_FACTOR * loudest)
+    return max(least, LOUDEST_FACTOR * baseline.loudness(further.instrument))
 
 
 def passing_gain(term: Term) -> float:
     """Gain that a term has to bring for its beginning or end inside the record; else nothing."""
-    if term.interval == ALWAYS:
+    if term.interval == ALWAYS or term.effect.legible:
         return 0.0
     graded = sum(p.healthy is not None and p.minimum > 0.0 for p in term.effect.parameters)
     return PASSING_FORM_GAIN if graded > 1 else PASSING_GAIN
@@ -108,7 +116,8 @@ def inexact(current: Fit, nothing: float) -> float:
         share, largest = FURTHER_EXACT_SHARE, LARGEST_EXACT_INEXACTNESS
     else:
         share, largest = FURTHER_SHARE, LARGEST_INEXACTNESS
-    return min(max(share * gained, ACCEPTED_FURTHER_GAIN), largest)
+    most = max(largest, LEAST_SHARE_BESIDE * gained)
+    return min(max(share * gained, ACCEPTED_FURTHER_GAIN), most)
 
 
 @dataclass(frozen=True)
@@ -285,7 +294,7 @@ def is_plausible(term: Term) -> bool:
     if term.relative_size < SMALLEST_SIZE:
         return False
     for parameter in term.effect.parameters:
-        if parameter.healthy is None or parameter.minimum <= 0.0:
+        if parameter.healthy is None or parameter.minimum <= 0.0 or not parameter.fitted:
             continue
         margin = 0.02 * (parameter.high - parameter.low)
         reach = 0.85 * (parameter.high - 1.0)

@@ -23,8 +23,8 @@ INTERVAL_FACTOR = 1.96
 MISMATCH_FACTOR = 1.25
 """Intervals are wider than the noise alone would make them, for the simulation is not exact."""
 
-FORM_ERROR = 0.025
-"""Standard error of a size, relative to it, that the simulation's form leaves."""
+LARGEST_EQUAL = 60.0
+"""Explanations are never equal if their penalised costs differ by more."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,9 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             value = term.values[parameter.name]
             departure = 0.0 if parameter.healthy is None else value - parameter.healthy
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
-            error = INTERVAL_FACTOR * float(np.hypot(noise, FORM_ERROR * departure))
+            # What an inexact form adds to one component of an effect, it takes from others.
+            size = max(abs(departure), term.relative_size * parameter.minimum)
+            error = INTERVAL_FACTOR * float(np.hypot(noise, term.effect.form_error * size))
             place += 1
             if not np.isfinite(error):
                 if not parameter.fitted and departure != 0.0:
@@ -113,7 +115,7 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
     """Explanations that fit as well with one effect exchanged: its position, the explanation."""
     own = [t.key for t in naming.fit.terms]
     share = EQUAL_SHARE if len(own) == 1 else 0.0
-    limit = max(2.0 * EQUAL_LIKELIHOOD, share * naming.gain)
+    limit = max(2.0 * EQUAL_LIKELIHOOD, min(share * naming.gain, LARGEST_EQUAL))
     seen = set(own)
     out: list[tuple[int, Alternative]] = []
     for alternative in naming.alternatives:

@@ -23,6 +23,9 @@ _LARGEST_DAMPING = 1e5
 
 _LEAST_INFORMATION = 1e-4
 
+WIDEST = 4.0
+"""Differences for covariances go up to so many smallest sizes."""
+
 EXACT = 0.02
 """Drop of the cost that moves the parameters by a seventh of their standard deviations."""
 
@@ -193,20 +196,22 @@ class Problem:
         low: FloatArray,
         high: FloatArray,
         carried: FloatArray | None = None,
+        steps: FloatArray | None = None,
     ) -> FloatArray:
-        """Derivatives of what is compared, shape (l, parameters), in units of the step.
+        """Derivatives of what is compared, shape (l, parameters), in units of `difference`.
 
         Args:
             values: Where.
             base: What is compared there, shape (l,).
             low, high: Bounds.
             carried: Those by the first parameters, from elsewhere.
+            steps: Distances to where they are taken from; None: `difference` of each parameter.
         """
         columns = [] if carried is None else list(carried.T)
         first = len(columns)
         for k, (_, parameter) in list(enumerate(_parameters(self._terms)))[first:]:
-            step = parameter.difference
-            if values[k] + step > high[k]:
+            step = parameter.difference if steps is None else float(steps[k])
+            if not low[k] <= values[k] + step <= high[k]:
                 step = -step
             moved = values.copy()
             moved[k] = min(max(values[k] + step, low[k]), high[k])
@@ -337,15 +342,57 @@ def fit(
             break
         exact = False
     seen = np.diag(normal) > _LEAST_INFORMATION
-    covariance = np.diag(np.where(seen, 0.0, np.inf))
-    width = np.array([p.high - p.low for p in parameters])
-    information = normal / np.outer(scale, scale) + np.diag(1e-9 / width**2)
-    covariance[np.ix_(seen, seen)] = np.linalg.pinv(information[np.ix_(seen, seen)])
+    covariance = _covariance(normal, parameters)
     fitted = _with_values(terms, values)
     active = int(np.count_nonzero(seen))
     return Fit(
         fitted, cost, vector, simulated, covariance, problem.evaluations, active, slopes
     )
+
+
+def _covariance(normal: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
+    """Covariance of parameters, infinite for those that are not seen.
+
+    Args:
+        normal: Products of the white derivatives, in units of `difference`.
+        parameters: What they are by.
+    """
+    seen = np.diag(normal) > _LEAST_INFORMATION
+    covariance = np.diag(np.where(seen, 0.0, np.inf))
+    width = np.array([p.high - p.low for p in parameters])
+    scale = np.array([p.difference for p in parameters])
+    information = normal / np.outer(scale, scale) + np.diag(1e-9 / width**2)
+    covariance[np.ix_(seen, seen)] = np.linalg.pinv(information[np.ix_(seen, seen)])
+    return covariance
+
+
+def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> FloatArray:
+    """Covariance of the parameters of a fit in a null, from differences that matter.
+
+    What a small difference changes is in part on which side of a bin's border a pulse falls: it
+    looks like information and is none. So they are taken over the smallest size worth reporting
+    and more, towards health.
+
+    Args:
+        whitener: The null.
+        station: The station as commissioned.
+        explanation: The fit.
+    """
+    problem = Problem(whitener, station, explanation.terms, explanation.simulated)
+    parameters = [p for _, p in _parameters(explanation.terms)]
+    low, high = _bounds(whitener, explanation.terms)
+    values = np.clip(values_of(explanation.terms), low, high)
+    steps = []
+    for value, parameter in zip(values, parameters, strict=True):
+        departure = 0.0 if parameter.healthy is None else value - parameter.healthy
+        size = np.clip(0.5 * abs(departure), parameter.minimum, WIDEST * parameter.minimum)
+        back = -1.0 if departure > 0.0 else 1.0
+        steps.append(back * max(float(size), parameter.difference))
+    base = problem.compared(problem.simulate(values))
+    jacobian = problem.whitened(
+        problem.slopes(values, base, low, high, steps=np.array(steps))
+    )
+    return _covariance(jacobian.T @ jacobian, parameters)
 
 
 def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:

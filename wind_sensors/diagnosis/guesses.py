@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparison import BANDS, Comparison
 from wind_sensors.diagnosis.effects import catalogue
@@ -63,6 +64,18 @@ DEAD_TIME_CUTS = 30
 
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
+
+NARROWER = (1.0, 0.65, 0.4)
+"""Widths to begin with, in widths of the sector where the nose should have been: the reference
+does not tell that within some degrees."""
+
+REPEATED = 6.0
+LEAST_REPEATS = 20
+FEWEST_STEPS = 3
+SMOOTHED_READINGS = 101
+SHORTEST_COARSE = 60.0
+"""Readings that come so many times as often as others, and so often, are coarse: at least three
+different ones, most of so many readings in a row, for so long [s]."""
 
 _RATE_THAT_TURNS = 1.5
 
@@ -293,6 +306,8 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
             turns = np.exp(2j * np.pi * values / step)
             origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
             out.append(_term("quantisation", vane, step=step, origin=origin))
+    else:
+        out.extend(_coarse_for_a_while(comparison, vane))
     common = values[counts > max(0.004 * readings.size, 20)]
     hole = _hole(degrees)
     if hole is not None:
@@ -315,6 +330,32 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
     return out
 
 
+def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
+    """Quantisation in the longest part of the record in which readings repeat a few values."""
+    readings = comparison.recording.angles[vane]
+    told = np.isfinite(readings.angle)
+    degrees = np.round(np.degrees(readings.angle[told]), 4)
+    time = comparison.grid.seconds(readings.time[told])
+    values, place, counts = np.unique(degrees, return_inverse=True, return_counts=True)
+    repeated = counts > max(REPEATED * degrees.size / values.size, LEAST_REPEATS)
+    if np.count_nonzero(repeated) < FEWEST_STEPS:
+        return []
+    coarse = repeated[place]
+    usual = uniform_filter1d(coarse.astype(np.float64), SMOOTHED_READINGS) > 0.5
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], usual, [False])).astype(np.int8)))
+    begin, end = max(
+        zip(edges[::2], edges[1::2], strict=True), key=lambda run: float(run[1] - run[0])
+    )
+    inside = np.unique(degrees[begin:end][coarse[begin:end]])
+    if inside.size < FEWEST_STEPS or time[end - 1] - time[begin] < SHORTEST_COARSE:
+        return []
+    step = float(np.median(np.diff(inside)))
+    turns = np.exp(2j * np.pi * inside / step)
+    origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
+    holds = interval_of(comparison, float(time[begin]), float(time[end - 1]), NEAR_AN_END)
+    return [replace(_term("quantisation", vane, step=step, origin=origin), interval=holds)]
+
+
 def _gap(
     vane: str, centre: float, width: float, form: int = 0, reading: float = 0.0
 ) -> Term:
@@ -328,7 +369,8 @@ def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     wrong = erratic(comparison.recording.angles[channel.instrument])
     if np.mean(wrong) < LEAST_ERRATIC:
         return []
-    return [_gap(channel.instrument, *_sector(comparison, channel, wrong), 2)]
+    centre, width = _sector(comparison, channel, wrong)
+    return [_gap(channel.instrument, centre, share * width, 2) for share in NARROWER]
 
 
 def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple[float, float]:

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.baseline import (
-    CALIBRATED_FROM,
     FREQUENCIES,
     Baseline,
     ChannelBaseline,
@@ -32,6 +31,7 @@ from wind_sensors.diagnosis.signatures import (
     in_parallel,
     signature_bank,
     templates_of,
+    with_larger,
 )
 from wind_sensors.diagnosis.whitening import trust_of, unstanding, whitener_of
 from wind_sensors.station.model import Angle, Rotor, Station
@@ -56,9 +56,6 @@ STANDING_MEAN_PRIOR = 0.7
 
 SELDOM = 0.1
 """Winds below this quantile are too rare in healthy recordings to say what is normal."""
-
-REACH = 0.5
-"""Down to this share of the slowest such wind they say it nevertheless."""
 
 LARGEST_SHARED_BANK = 4
 """Effects with more templates than this have no shared amplitude, only a scatter."""
@@ -201,34 +198,43 @@ class Evidence:
     """What one healthy recording says about the amplitudes of the templates.
 
     Attributes:
-        keys: Of the templates.
-        gram: Products of the noise-whitened signatures, shape (k, k).
-        seen: Products of the signatures with the residual, shape (k,).
-        inner: Products of the signatures when every effect may stand at its least size.
-        inner_seen: The same with the residual.
+        probes: The catalogue's templates, then their larger sizes.
+        gram: Products of the noise-whitened signatures of all probes, shape (p, p).
+        seen: Products of these signatures with the residual, shape (p,).
+        inner: Products of the catalogue's signatures when every effect may stand at its least
+            size, shape (k, k).
+        inner_seen: The same with the residual, shape (k,).
     """
 
-    keys: tuple[str, ...]
+    probes: tuple[Template, ...]
     gram: FloatArray
     seen: FloatArray
     inner: FloatArray
     inner_seen: FloatArray
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Of the catalogue's templates."""
+        return tuple(t.key for t in self.probes[: len(self.inner)])
+
 
 def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
     """What a healthy recording says about every template."""
     templates = templates_of(comparison, baseline.station, catalogue())
-    bank = signature_bank(comparison, baseline.station, templates)
+    bank = with_larger(
+        signature_bank(comparison, baseline.station, templates), comparison, baseline.station
+    )
     trust = trust_of(comparison, bank.without, baseline)
-    signatures = bank.whitened(comparison, trust)
+    probed = bank.whitened(comparison, trust)
+    signatures = probed[: len(templates)]
     residual = comparison.vector(bank.without, trust)
     least = np.array([t.smallest_standing for t in templates])
     whitener = whitener_of(comparison, trust, signatures, least)
     white = whitener.through_standing(signatures)
     return Evidence(
-        keys=tuple(t.key for t in templates),
-        gram=signatures @ signatures.T,
-        seen=signatures @ residual,
+        probes=tuple(bank.templates),
+        gram=probed @ probed.T,
+        seen=probed @ residual,
         inner=white @ white.T,
         inner_seen=white @ whitener.through_standing(residual),
     )
@@ -264,8 +270,10 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
     amplitudes: dict[str, list[tuple[float, float]]] = {}
     for row in rows:
         shared = np.array([means.get(key, 0.0) for key in row.keys])
-        power = np.diag(row.gram)
-        rest = row.seen - row.gram @ shared
+        size = len(row.keys)
+        gram = row.gram[:size, :size]
+        power = np.diag(gram)
+        rest = row.seen[:size] - gram @ shared
         for k, key in enumerate(row.keys):
             if power[k] > 1e-3:
                 amplitudes.setdefault(key, []).append(
@@ -284,37 +292,38 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
     return out
 
 
-def loudest_gain(rows: Sequence[Evidence], templates: Mapping[str, Template]) -> float:
-    """Largest gain that any effect promises in a healthy recording judged by the others.
+def loudest_gains(rows: Sequence[Evidence]) -> dict[str, float]:
+    """Largest gains that effects promise in a healthy recording judged by the others.
 
     Args:
         rows: Of each healthy recording.
-        templates: By key.
 
     Returns:
-        Drop of the cost beyond what its parameters cost; 0 with fewer than three recordings.
+        By instrument (or `station`, `platform`), drop of the cost beyond what the parameters cost;
+        nothing with fewer than three recordings.
     """
+    loudest: dict[str, float] = {}
     if len(rows) < 3:
-        return 0.0
-    loudest = 0.0
+        return loudest
     for left_out, row in enumerate(rows):
         others = [r for k, r in enumerate(rows) if k != left_out]
         means, sizes = standing_means(others), standing_sizes(others, standing_means(others))
-        known = [templates[key] for key in row.keys]
-        standing = np.array([max(sizes.get(t.key, 0.0), t.smallest_standing) for t in known])
-        shared = np.array([means.get(t.key, 0.0) for t in known])
-        seen = row.seen - row.gram @ shared
-        kept = standing > 0.0
+        own = row.probes[: len(row.keys)]
+        standing = np.array([max(sizes.get(t.key, 0.0), t.smallest_standing) for t in own])
+        shared = np.array([means.get(t.key, 0.0) for t in own])
+        seen = row.seen - row.gram[:, : len(own)] @ shared
+        kept = np.flatnonzero(standing > 0.0)
         part = row.gram[:, kept]
         inner = np.linalg.solve(
             np.diag(1.0 / standing[kept] ** 2) + row.gram[np.ix_(kept, kept)], part.T
         )
         gram = row.gram - part @ inner
         seen = seen - inner.T @ seen[kept]
-        for score in scores_of(known, gram, seen):
+        for score in scores_of(row.probes, gram, seen):
             parameters = len(score.template.effect.parameters)
             cost = PENALTY_PER_PARAMETER + PENALTY_PER_FURTHER_PARAMETER * (parameters - 1)
-            loudest = max(loudest, score.gain - cost)
+            before = loudest.get(score.instrument, 0.0)
+            loudest[score.instrument] = max(before, score.gain - cost)
     return loudest
 
 
@@ -380,16 +389,11 @@ def learn(
         (lambda share: progress(0.2 + 0.8 * share)) if progress else None,
     )
     means = standing_means(rows)
-    templates = {
-        t.key: t
-        for c in comparisons
-        for t in templates_of(c, baseline.station, catalogue())
-    }
     speeds = np.concatenate([c.speed for c in comparisons])
     return replace(
         baseline,
-        slowest_wind=min(CALIBRATED_FROM, REACH * float(np.quantile(speeds, SELDOM))),
-        loudest_gain=loudest_gain(rows, templates),
+        usual_wind=float(np.quantile(speeds, SELDOM)),
+        loudest=loudest_gains(rows),
         recordings=tuple(r.name for r in recordings),
         means=means,
         standing=standing_sizes(rows, means),

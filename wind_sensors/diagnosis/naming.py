@@ -11,6 +11,7 @@ from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     EQUAL_SHARE,
+    SMALLEST_BESIDE,
     Alternative,
     Judged,
     Naming,
@@ -27,10 +28,9 @@ from wind_sensors.diagnosis.explanation import (
     single_event,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
-from wind_sensors.diagnosis.screening import screen
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.signatures import in_parallel
 from wind_sensors.diagnosis.whitening import Whitener
@@ -127,34 +127,38 @@ def _leader(
     whitener: Whitener,
     current: Fit,
     ranked: Sequence[Judged],
-    needed: float,
 ) -> Judged | None:
     """The explanation that brings most of those that bring enough; None: there is none.
 
-    Only those compete that are not clearly behind in likelihood.
+    Only those compete that are not clearly behind in likelihood; of those that bring the same the
+    likeliest leads.
 
     Args:
         searcher: The search.
         whitener: The null of the terms so far.
         current: The terms so far.
         ranked: Explanations with one more, best first.
-        needed: Gain that the next term has to bring.
     """
     so_far = evidence(current, whitener)
-    leader: Judged | None = None
-    most, likeliest = -np.inf, np.inf
+    enough: list[tuple[float, Judged]] = []
+    likeliest = np.inf
     for one in ranked:
         if one.evidence > likeliest + CLEARLY_BETTER:
             break
         brings = _brings(searcher, one, current, so_far)
         newest = one.fit.terms[-1]
         least = max(
-            needed, passing_gain(newest), _inexactness(searcher, whitener, current, newest)
+            needed_gain(current, newest, searcher.baseline),
+            passing_gain(newest),
+            _inexactness(searcher, whitener, current, newest),
         )
-        if brings >= least and brings > most:
-            leader, most = one, brings
+        if brings >= least:
+            enough.append((brings, one))
             likeliest = min(likeliest, one.evidence)
-    return leader
+    if not enough:
+        return None
+    most = max(brings for brings, _ in enough)
+    return next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
 
 
 def _with_sharp_intervals(
@@ -165,14 +169,18 @@ def _with_sharp_intervals(
     def sharper(one: Judged) -> Fit:
         return refined_interval(searcher, one.whitener, one.fit)
 
-    passing = [r for r in ranked if r.fit.terms[-1].interval != ALWAYS]
-    lasting = [r for r in ranked if r.fit.terms[-1].interval == ALWAYS]
+    passing = [
+        r
+        for r in ranked
+        if r.fit.terms[-1].interval != ALWAYS and not r.fit.terms[-1].effect.legible
+    ]
+    lasting = [r for r in ranked if not any(r is p for p in passing)]
     sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
     return sorted([*lasting, *sharp], key=lambda r: r.evidence)
 
 
 def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: Term) -> float:
-    """What a further term must exceed if it acts on signals that the terms so far change."""
+    """What a further term must bring if it acts on signals that the terms so far change."""
     reached = {
         name
         for term in current.terms
@@ -180,6 +188,8 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: 
     }
     if further.instrument not in (reached | {STATION, PLATFORM}):
         return 0.0
+    if current.terms and further.relative_size < SMALLEST_BESIDE:
+        return np.inf
     nothing = whitener.of(searcher.bank.without)
     return inexact(current, float(nothing @ nothing)) if current.terms else 0.0
 
@@ -212,9 +222,7 @@ def _further_fits(
         if eligible(starts)
     ]
     if not windowed:
-        scores = screen(
-            searcher.bank.templates, searcher.white_signatures(whitener), current.vector
-        )
+        scores = searcher.scores(whitener, current.vector)
         if all(
             s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
         ):
@@ -246,9 +254,7 @@ def _greedy(
     current = no_terms(whitener, searcher)
     screened = tuple(
         (s.effect, s.instrument, s.gain)
-        for s in screen(
-            searcher.bank.templates, searcher.white_signatures(whitener), current.vector
-        )[:12]
+        for s in searcher.scores(whitener, current.vector)[:12]
     )
     alternatives: tuple[Alternative, ...] = ()
     alone: tuple[Term, ...] = ()
@@ -264,10 +270,13 @@ def _greedy(
         else:
             fits = _further_fits(searcher, whitener, current, excluded)
         fits = sorted((f for f in fits if plausible(f)), key=total)
-        needed = needed_gain(current, searcher.baseline.loudest_gain)
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
-        if not fits or total(current) - total(fits[0]) < WORTH_JUDGING * needed:
+        if not any(
+            total(current) - total(f)
+            >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
+            for f in fits
+        ):
             break
         # Noise and coherence were judged with the mismatch still in them: the best few compete,
         # each in the null that it leaves itself.
@@ -278,7 +287,7 @@ def _greedy(
         ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
         ranked = [r for r in ranked if plausible(r.fit)]
         ranked = _with_sharp_intervals(searcher, ranked, named)
-        leader = _leader(searcher, whitener, current, ranked, needed)
+        leader = _leader(searcher, whitener, current, ranked)
         if leader is None:
             break
         current = leader.fit
@@ -309,8 +318,9 @@ def _greedy(
     adequate = whitener
     if current.terms:
         adequate = searcher.whitener(current.simulated, current.simulated)
-        inexact = fit(adequate, searcher.station, current.terms, searcher.bank.without, 1)
-        current = replace(current, covariance=inexact.covariance)
+        current = replace(
+            current, covariance=covariance_of(adequate, searcher.station, current)
+        )
     if progress:
         progress(1.0)
     return Naming(
@@ -322,12 +332,12 @@ def _greedy(
 def _without_implausible(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit without terms that ran into their bounds when all were fitted together."""
     nothing = no_terms(whitener, searcher)
-    needed = needed_gain(nothing, searcher.baseline.loudest_gain)
     while not all(is_plausible(term) for term in current.terms):
         kept = [term for term in current.terms if is_plausible(term)]
         if not kept:
             return nothing
         current = fit(whitener, searcher.station, kept, searcher.bank.without)
+        needed = min(needed_gain(nothing, term, searcher.baseline) for term in kept)
         if total(nothing) - total(current) < needed:
             return nothing
     return current

@@ -18,9 +18,9 @@ from wind_sensors.diagnosis.intervals import (
 )
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
+    Key,
     Score,
-    group_templates,
-    screen,
+    group_sizes,
     starting_values,
 )
 from wind_sensors.diagnosis.search import PENALTY_PER_INTERVAL, Searcher
@@ -106,16 +106,13 @@ def window_starts(
     Returns:
         Starting points of the most promising, several for each.
     """
-    bank = searcher.bank
-    always = {
-        (s.effect, s.instrument): s.gain
-        for s in screen(bank.templates, searcher.white_signatures(whitener), vector)
-    }
+    bank = searcher.probes
+    always = {(s.effect, s.instrument): s.gain for s in searcher.scores(whitener, vector)}
     cuts = _screening_cuts(searcher)
-    found: list[tuple[float, list[Term]]] = []
-    for key, members in group_templates(bank.templates).items():
+    found: dict[Key, tuple[float, list[Term]]] = {}
+    for (key, multiple), members in group_sizes(bank.templates).items():
         effect = searcher.effects[key[0]]
-        if key in used or effect.name == "stuck_sensor":
+        if key in used or effect.legible:
             continue
         cells = [
             whitener.through_standing(
@@ -133,7 +130,7 @@ def window_starts(
         ):
             continue
         amplitudes = {
-            bank.templates[k].number: float(a)
+            bank.templates[k].number: multiple * float(a)
             for k, a in zip(members, span.amplitudes, strict=True) if a != 0.0
         }  # fmt: skip
         template = bank.templates[members[int(np.argmax(np.abs(span.amplitudes)))]]
@@ -143,8 +140,9 @@ def window_starts(
         interval = interval_of(searcher.comparison, *span.window, NEAR_AN_END)
         starts = [Term(effect, key[1], starting_values(score), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
-        found.append((span.net, starts))
-    ranked = sorted(found, key=lambda pair: -pair[0])
+        if key not in found or span.net > found[key][0]:
+            found[key] = (span.net, starts)
+    ranked = sorted(found.values(), key=lambda pair: -pair[0])
     return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
 
 
@@ -243,7 +241,7 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
     """
     comparison = searcher.comparison
     for term in current.terms:
-        if term.interval != ALWAYS or term.effect.name == "stuck_sensor":
+        if term.interval != ALWAYS or term.effect.legible:
             continue
         whitener = searcher.whitener(current.simulated, current.simulated)
         known = seen_in(whitener, current)

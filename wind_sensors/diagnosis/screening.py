@@ -26,9 +26,9 @@ class Score:
     Attributes:
         effect, instrument: Names.
         gain: Drop of the cost that the best combination of its templates promises.
-        amplitudes: Best combination, by template number.
+        amplitudes: Best combination, by the number of the effect's template and in units of it.
         template: The best single template.
-        amplitude: Of that template.
+        amplitude: Of that template, in the same unit.
     """
 
     effect: str
@@ -47,11 +47,24 @@ def _joint(gram: FloatArray, seen: FloatArray) -> tuple[float, FloatArray]:
     return float(scaled @ (seen / scale)), scaled / scale
 
 
-def group_templates(templates: Sequence[Template]) -> dict[tuple[str, str], list[int]]:
+Key = tuple[str, str]
+"""An effect and its instrument, by name."""
+
+
+def group_templates(templates: Sequence[Template]) -> dict[Key, list[int]]:
     """Indices of the templates of each effect of each instrument."""
-    groups: dict[tuple[str, str], list[int]] = {}
+    groups: dict[Key, list[int]] = {}
     for k, template in enumerate(templates):
         groups.setdefault((template.effect.name, template.instrument), []).append(k)
+    return groups
+
+
+def group_sizes(templates: Sequence[Template]) -> dict[tuple[Key, float], list[int]]:
+    """The same, with the sizes of an effect apart."""
+    groups: dict[tuple[Key, float], list[int]] = {}
+    for k, template in enumerate(templates):
+        key = (template.effect.name, template.instrument)
+        groups.setdefault((key, template.multiple), []).append(k)
     return groups
 
 
@@ -77,8 +90,8 @@ def scores_of(templates: Sequence[Template], gram: FloatArray, seen: FloatArray)
         seen: Products of the signatures with the white vector, shape (k,).
     """
     power = np.diag(gram)
-    out = []
-    for (effect, instrument), members in group_templates(templates).items():
+    found: dict[Key, Score] = {}
+    for (key, multiple), members in group_sizes(templates).items():
         alive = [k for k in members if power[k] > _WEAKEST]
         if not alive:
             continue
@@ -90,13 +103,13 @@ def scores_of(templates: Sequence[Template], gram: FloatArray, seen: FloatArray)
             amplitudes = {
                 templates[k].number: float(a) for k, a in zip(alive, solved, strict=True)
             }
-        out.append(
-            Score(
-                effect, instrument, gain, amplitudes, templates[single],
-                float(seen[single] / power[single]),
-            )
+        score = Score(
+            *key, gain, {number: multiple * a for number, a in amplitudes.items()},
+            templates[single], multiple * float(seen[single] / power[single]),
         )  # fmt: skip
-    return sorted(out, key=lambda s: -s.gain)
+        if key not in found or gain > found[key].gain:
+            found[key] = score
+    return sorted(found.values(), key=lambda s: -s.gain)
 
 
 def starting_values(score: Score) -> dict[str, float]:
@@ -104,7 +117,7 @@ def starting_values(score: Score) -> dict[str, float]:
     effect = score.template.effect
     values = {p.name: (0.0 if p.healthy is None else p.healthy) for p in effect.parameters}
     for parameter in effect.parameters:
-        if parameter.healthy is None:
+        if parameter.healthy is None or not parameter.fitted:
             values[parameter.name] = score.template.values[parameter.name]
     joint = len(score.amplitudes) > 1
     for number, amplitude in score.amplitudes.items():
@@ -112,7 +125,7 @@ def starting_values(score: Score) -> dict[str, float]:
         if not joint and number != score.template.number:
             continue
         for parameter in effect.parameters:
-            if parameter.healthy is not None:
+            if parameter.healthy is not None and parameter.fitted:
                 departure = template[parameter.name] - parameter.healthy
                 values[parameter.name] += amplitude * departure
     for parameter in effect.parameters:

@@ -9,12 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.calibrated_range import calm_share
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
 from wind_sensors.diagnosis.effects.definition import STATION, Effect
 from wind_sensors.diagnosis.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
+    Score,
     group_templates,
     screen,
     starting_values,
@@ -24,6 +26,7 @@ from wind_sensors.diagnosis.signatures import (
     in_parallel,
     signature_bank,
     templates_of,
+    with_larger,
 )
 from wind_sensors.diagnosis.whitening import (
     Whitener,
@@ -42,6 +45,9 @@ LEAST_SHARE = 0.03
 
 SLOW_WIND = 0.1
 """Quantile of the wind's speed that takes longest from the reference to the instruments."""
+
+DETOUR = 1.5
+"""Delays are up to so many times longer than the way at that speed."""
 
 COMMON_LAG = 0.5
 """Standard deviation of the common delay, in separations over the wind's speed."""
@@ -81,7 +87,8 @@ class Searcher:
     Attributes:
         comparison: The recording.
         baseline: What is normal.
-        bank: Signatures of the catalogue.
+        bank: Signatures of the catalogue, of which the null lets healthy days have a little.
+        probes: The same with larger sizes, for screening.
         effects: The catalogue.
         workers: Processes.
     """
@@ -89,6 +96,7 @@ class Searcher:
     comparison: Comparison
     baseline: Baseline
     bank: SignatureBank
+    probes: SignatureBank
     effects: Mapping[str, Effect]
     guesses: Mapping[tuple[str, str], Sequence[Term]]
     workers: int = 1
@@ -111,9 +119,14 @@ class Searcher:
 
     def _whitener(self, trust: Mapping[str, Trust], named: Simulated | None) -> Whitener:
         templates = self.bank.templates
+        calm = calm_share(self.comparison, self.baseline)
         standing = np.array(
             [
-                max(self.baseline.standing.get(t.key, 0.0), t.smallest_standing)
+                max(
+                    self.baseline.standing.get(t.key, 0.0),
+                    t.smallest_standing,
+                    calm * t.standing_in_calm,
+                )
                 for t in templates
             ]
         )
@@ -164,7 +177,7 @@ class Searcher:
         """
         reference = self.comparison.recording.station.reference
         distance = 0.0 if reference is None else reference.separation
-        way = distance / float(np.quantile(self.comparison.speed, SLOW_WIND))
+        way = DETOUR * distance / float(np.quantile(self.comparison.speed, SLOW_WIND))
         if term.effect.name == "timestamp_latency":
             return abs(term.values["latency"]) < way
         if term.effect.name == "clock_drift":
@@ -173,8 +186,17 @@ class Searcher:
         return False
 
     def white_signatures(self, whitener: Whitener) -> FloatArray:
-        """Signatures of the catalogue in a null."""
-        return whitener.through_standing(self.bank.whitened(self.comparison, whitener.trust))
+        """Signatures of the probes in a null, one a row."""
+        return whitener.through_standing(self.probes.whitened(self.comparison, whitener.trust))
+
+    def scores(self, whitener: Whitener, vector: FloatArray) -> list[Score]:
+        """Linear scores of the whole catalogue over the record, best first.
+
+        Args:
+            whitener: The null.
+            vector: What is to be explained.
+        """
+        return screen(self.probes.templates, self.white_signatures(whitener), vector)
 
     def single_candidates(
         self, whitener: Whitener, vector: FloatArray, number: int, blind: bool = False
@@ -188,8 +210,8 @@ class Searcher:
             blind: Try those as well of which a small size shows no way.
         """
         signatures = self.white_signatures(whitener)
-        scores = screen(self.bank.templates, signatures, vector)
-        groups = group_templates(self.bank.templates)
+        scores = screen(self.probes.templates, signatures, vector)
+        groups = group_templates(self.probes.templates)
         out: list[list[Term]] = []
         worth = max(LEAST_GAIN, LEAST_SHARE * scores[0].gain) if scores else 0.0
         for score in [s for s in scores[:number] if s.gain > worth]:
@@ -213,7 +235,7 @@ class Searcher:
             if len(members) > JOINT_TEMPLATES:
                 order = np.argsort(-gains)[:3]
                 for k in order[1:]:
-                    template = self.bank.templates[members[int(k)]]
+                    template = self.probes.templates[members[int(k)]]
                     amplitude = float(np.clip(seen[k] / max(power[k], 1e-9), 0.3, 10.0))
                     values = effect.scaled(template.values, amplitude)
                     starts.append(Term(effect, score.instrument, values))
@@ -221,7 +243,10 @@ class Searcher:
         chosen = {starts[0].key for starts in out}
         for key, guesses in self.guesses.items():
             if key in chosen:
-                next(s for s in out if s[0].key == key).extend(guesses)
+                starts = next(s for s in out if s[0].key == key)
+                if self.effects[key[0]].legible:
+                    starts.clear()
+                starts.extend(guesses)
             elif blind or key[0] not in BLIND_EFFECTS:
                 out.append(list(guesses))
         return out
@@ -312,4 +337,5 @@ def searcher_of(
     """Prepare a search: simulate the catalogue in the recording's wind."""
     templates = templates_of(comparison, baseline.station, effects)
     bank = signature_bank(comparison, baseline.station, templates, workers, progress)
-    return Searcher(comparison, baseline, bank, effects, guesses, workers)
+    probes = with_larger(bank, comparison, baseline.station, workers)
+    return Searcher(comparison, baseline, bank, probes, effects, guesses, workers)

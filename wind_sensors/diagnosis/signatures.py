@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,16 @@ from wind_sensors.diagnosis.effects.definition import (
     with_effect,
 )
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 
 _SECTOR_SHARE = 0.01
+
+LARGER = (4.0, -4.0)
+"""Multiples of an effect's template that are screened as well. Where a rotor gives few pulses in a
+turn, what a small effect changes is mostly on which side of a bin's border an edge falls."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +41,14 @@ class Template:
         instrument: Name of the instrument, or `platform`.
         number: Which of the effect's templates.
         values: Parameters.
+        multiple: Of the effect's template.
     """
 
     effect: Effect
     instrument: str
     number: int
     values: Mapping[str, float]
+    multiple: float = 1.0
 
     @property
     def key(self) -> str:
@@ -54,6 +61,12 @@ class Template:
         size = max(self.effect.relative_size(self.values), 0.5)
         crowd = max(1.0, len(self.effect.templates) / 4.0)
         return float(self.effect.standing / size / np.sqrt(crowd))
+
+    @property
+    def standing_in_calm(self) -> float:
+        """Standing size, in units of the template, in winds of which nothing is known."""
+        size = max(self.effect.relative_size(self.values), 0.5)
+        return self.effect.standing_in_calm / size
 
     def planted(self, station: Station) -> Station:
         """The station with the effect."""
@@ -106,6 +119,21 @@ def templates_of(
                 for number, values in enumerate(effect.templates)
                 if _visited(comparison, effect, values)
             )
+    return out
+
+
+def _larger_templates(templates: Iterable[Template]) -> list[Template]:
+    """Larger sizes of the effects that have one template and whose bounds allow them."""
+    out = []
+    for template in templates:
+        effect = template.effect
+        if len(effect.templates) > 1:
+            continue
+        for multiple in LARGER:
+            values = effect.scaled(template.values, multiple)
+            undone = effect.scaled(values, 1.0 / multiple)
+            if all(np.isclose(undone[name], value) for name, value in template.values.items()):
+                out.append(replace(template, values=values, multiple=multiple))
     return out
 
 
@@ -192,11 +220,44 @@ def signature_bank(
 ) -> SignatureBank:
     """Simulate every template in a recording's wind."""
     without = comparison.simulate(station)
+    parts = in_parallel(_planting(comparison, station), templates, workers, progress)
+    with_each = [without.with_others(part) for part in parts]
+    return SignatureBank(templates, without, with_each)
+
+
+def with_larger(
+    bank: SignatureBank, comparison: Comparison, station: Station, workers: int = 1
+) -> SignatureBank:
+    """A bank with larger sizes of its effects, as far as they can be simulated."""
+    plant = _planting(comparison, station)
+
+    def tried(template: Template) -> Simulated | None:
+        try:
+            return plant(template)
+        except UserError:
+            return None
+
+    larger = _larger_templates(bank.templates)
+    parts = in_parallel(tried, larger, workers)
+    possible = [
+        (template, bank.without.with_others(part))
+        for template, part in zip(larger, parts, strict=True)
+        if part is not None
+    ]
+    return SignatureBank(
+        [*bank.templates, *(template for template, _ in possible)],
+        bank.without,
+        [*bank.with_each, *(simulated for _, simulated in possible)],
+    )
+
+
+def _planting(
+    comparison: Comparison, station: Station
+) -> Callable[[Template], Simulated]:
+    """What simulates the signals that a template changes."""
 
     def planted(template: Template) -> Simulated:
         only = comparison.affected(station, template.instrument)
         return comparison.simulate(template.planted(station), only=only)
 
-    parts = in_parallel(planted, templates, workers, progress)
-    with_each = [without.with_others(part) for part in parts]
-    return SignatureBank(templates, without, with_each)
+    return planted

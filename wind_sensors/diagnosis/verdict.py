@@ -18,6 +18,8 @@ from wind_sensors.diagnosis.decision import (
     is_noisy,
     made_up,
     remainder_of,
+    stands_out,
+    undo_each_other,
     verdict_of,
     with_own_noise,
 )
@@ -97,12 +99,19 @@ def smallest_detectable(
     """
     signatures = searcher.white_signatures(whitener)
     power = np.einsum("ij,ij->i", signatures, signatures)
+    templates = searcher.probes.templates
     out: dict[str, tuple[float, str, float]] = {}
-    for (effect_name, _), members in group_templates(searcher.bank.templates).items():
-        best = max(members, key=lambda k: float(power[k]))
+    for (effect_name, _), members in group_templates(templates).items():
+        # Of a small size much of what it changes may be chance: where larger ones were simulated,
+        # they tell how much an effect shows.
+        largest = max(abs(templates[k].multiple) for k in members)
+        best = max(
+            (k for k in members if abs(templates[k].multiple) == largest),
+            key=lambda k: float(power[k]),
+        )
         if power[best] < 1e-6:
             continue
-        template = searcher.bank.templates[best]
+        template = templates[best]
         effect: Effect = template.effect
         needed = ACCEPTED_GAIN + PENALTY_PER_PARAMETER * len(effect.parameters)
         amplitude = float(np.sqrt(needed / power[best]))
@@ -162,7 +171,7 @@ def diagnose(
     rest = region_bank(naming.adequate, searcher.bank.without)
     left = naming.adequate.of(naming.fit.simulated)
     after = strongest(naming.adequate, rest, left, naming.fit.simulated)
-    remainder = remainder_of(naming, rest, comparison)
+    remainder = remainder_of(naming, rest, comparison, baseline)
     detectable = smallest_detectable(searcher, whitener)
     equal = equal_explanations(naming)
     located_p = bank.p_value(max(f.score for f in before))
@@ -181,8 +190,8 @@ def diagnose(
     refuted = findings and not borne_out(findings)
     if refuted:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
-        verdict, findings = "none", ()
-    if made_up(findings, comparison):
+        verdict, findings = ("unknown" if stands_out(findings) else "none"), ()
+    if findings and (made_up(findings, comparison) or undo_each_other(naming, baseline.station)):
         verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
@@ -197,10 +206,8 @@ def diagnose(
     if calm:
         description = too_calm(baseline)
     if refuted:
-        description = (
-            f"{refuted_names} would fit, but no region stands out and blocks that were not fitted "
-            "do not bear it out"
-        )
+        objection = f"{refuted_names} would fit, but blocks that were not fitted do not bear it out"
+        description = f"{description}; {objection}" if description else objection
     return Diagnosis(
         recording=recording.name,
         verdict=verdict,

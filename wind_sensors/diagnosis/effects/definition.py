@@ -83,6 +83,8 @@ class Effect:
         shared: It may concern one instrument or all of them (the logger's clock).
         standing: Share of the smallest size worth reporting at which it is taken to be present on
             any healthy day, whatever healthy recordings say; 0 for what is there or is not.
+        standing_in_calm: The same in winds below those of calibrations and healthy recordings,
+            where the straight calibration line is continued.
         contains: Effects of the same instrument that it can stand in for exactly; the two are
             never named together.
         occasional: It acts in one sector, one lull or one part of the record; others show again
@@ -91,6 +93,9 @@ class Effect:
             look like that, so a beginning or an end inside the record needs more evidence.
         exact: Its form is certain (geometry, electronics, arithmetic); what others leave beside
             them may be their own form.
+        form_error: Standard error of a size, relative to it, that the simulation's form leaves.
+        legible: The signals themselves tell its size, when it begins and when it ends: a beginning
+            or an end is neither searched for nor paid for.
         noisy: What it does is drawn at random or hangs on the last digit (whether a vane sticks
             or slips), so that its simulation adds noise of its own.
         needs: Data without which it cannot be seen.
@@ -115,8 +120,11 @@ class Effect:
     occasional: bool = False
     smooths: bool = False
     exact: bool = False
+    form_error: float = 0.025
+    legible: bool = False
     noisy: bool = False
     standing: float = 0.1
+    standing_in_calm: float = 0.0
     needs: tuple[str, ...] = ()
     size: Callable[[Values], float] | None = None
 

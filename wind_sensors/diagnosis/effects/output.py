@@ -94,6 +94,7 @@ EXTRA_PULSES = Effect(
     applies=_is_rotor,
     update=_extra,
     noisy=True,
+    form_error=0.1,
     templates=({"bounce_probability": 0.01, "bounce_delay": 0.003},),
     confusable={"calibration_drift": "pulse intervals: bounce makes some very short"},
 )
@@ -180,6 +181,7 @@ STUCK_SENSOR = Effect(
     applies=_is_sensor,
     update=_outage,
     exact=True,
+    legible=True,
     templates=(),
     confusable={
         "vane_friction": "turn the vane by hand",

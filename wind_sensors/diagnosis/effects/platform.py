@@ -167,6 +167,7 @@ LEVER_ARM = Effect(
     applies=_is_platform,
     update=_lever,
     exact=True,
+    form_error=0.12,
     templates=(
         {"dx": 0.5, "dy": 0.0, "dz": 0.0},
         {"dx": 0.0, "dy": 0.5, "dz": 0.0},

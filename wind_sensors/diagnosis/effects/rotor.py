@@ -104,6 +104,7 @@ BEARING_FRICTION = Effect(
     ),
     applies=_is_rotor,
     update=_friction,
+    standing_in_calm=0.8,
     templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0, "breakaway": 1.0},),
     confusable={
         "calibration_offset": "a speed sweep: friction fades as 1/U, an offset stays",
@@ -132,6 +133,7 @@ AIR_DENSITY = Effect(
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_density,
     everywhere=True,
+    form_error=0.1,
     templates=({"density_ratio": 0.9},),
     confusable={
         "rotor_inertia": "a temperature or pressure swing",
@@ -161,6 +163,7 @@ ROTOR_INERTIA = Effect(
     ),
     applies=_is_rotor,
     update=_inertia,
+    form_error=0.15,
     templates=({"inertia_factor": 1.3},),
     confusable={
         "timestamp_latency": "a speed sweep: the lag of inertia is a length, of a clock a time",
@@ -182,6 +185,7 @@ TORQUE_ASYMMETRY = Effect(
     ),
     applies=lambda entry, station: isinstance(entry, Rotor),
     update=_set("a4"),
+    form_error=0.15,
     templates=({"a4": 0.6},),
     confusable={"calibration_drift": "a steadier wind: overspeeding needs turbulence"},
 )

@@ -67,6 +67,7 @@ VANE_INERTIA = Effect(
     ),
     applies=_is_vane,
     update=_inertia,
+    form_error=0.1,
     templates=({"inertia_factor": 1.4}, {"inertia_factor": 3.0}),
     confusable={
         "vane_damping": "a release test from 10 degrees",
@@ -97,6 +98,7 @@ VANE_DAMPING = Effect(
     ),
     applies=_is_vane,
     update=_damping,
+    form_error=0.15,
     templates=({"damping_factor": 1.4}, {"damping_factor": 0.6}),
     confusable={
         "vane_inertia": "a release test from 10 degrees",
@@ -268,6 +270,7 @@ QUANTISATION = Effect(
     update=_quantisation,
     exact=True,
     noisy=True,
+    legible=True,
     templates=({"step": 5.0, "origin": 0.0}, {"step": 22.5, "origin": 0.0}),
     confusable={"vane_friction": "strong wind: friction fades, steps stay"},
 )
@@ -290,6 +293,7 @@ LOW_PASS_FILTER = Effect(
     ),
     applies=_is_vane,
     update=_low_pass,
+    form_error=0.1,
     templates=({"time_constant": 0.1}, {"time_constant": 0.5}),
     confusable={
         "timestamp_latency": "amplitudes: a filter damps what a delay only shifts",
@@ -311,7 +315,7 @@ SENSOR_SWAP = Effect(
     source="definition",
     region="all directions",
     standing=0.0,
-    parameters=(Parameter("reversed", "1", -0.2, 1.2, minimum=0.6, step=1.0, starts=(1.0,)),),
+    parameters=(Parameter("reversed", "1", 0.0, 1.0, minimum=0.6, fitted=False),),
     applies=_is_vane,
     update=_reversed,
     exact=True,

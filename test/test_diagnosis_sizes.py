@@ -1,0 +1,129 @@
+"""Effects seen at sizes that matter: larger probes, wide differences, what readings give away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
+
+from wind_sensors.diagnosis.baseline import LOUD_ELSEWHERE, Baseline
+from wind_sensors.diagnosis.comparison import prepare
+from wind_sensors.diagnosis.decision import undo_each_other
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explanation import Naming
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
+from wind_sensors.diagnosis.guesses import guesses_of
+from wind_sensors.diagnosis.learning import default_baseline
+from wind_sensors.diagnosis.screening import scores_of
+from wind_sensors.diagnosis.search import Searcher, searcher_of
+from wind_sensors.diagnosis.signatures import LARGER
+from wind_sensors.station.model import Station
+
+SLOW = Station.model_validate(
+    {
+        **STATION.model_dump(mode="json", by_alias=True, exclude_none=True),
+        "instruments": [
+            {
+                **entry.model_dump(mode="json", by_alias=True, exclude_none=True),
+                **({"pulses_per_revolution": 1, "calibration_distance": 2.5}
+                   if entry.name == "cup" else {}),
+            }
+            for entry in STATION.instruments
+        ],
+    }
+)  # fmt: skip
+"""One pulse for every 2.5 m of wind: three in a second."""
+
+
+def searched(planted: Station, seed: int = 70) -> Searcher:
+    recording = replace(recorded(planted, seed), station=SLOW)
+    return searcher_of(prepare(recording), default_baseline(SLOW), catalogue(), {})
+
+
+def with_offset(offset: float) -> Station:
+    return with_effect(SLOW, catalogue()["calibration_offset"], "cup", {"offset": offset})
+
+
+def test_a_larger_size_shows_what_the_scatter_of_few_pulses_hides() -> None:
+    searcher = searched(with_offset(-0.4))
+    null = searcher.whitener(searcher.bank.without)
+    vector = null.of(searcher.bank.without)
+    small = len(searcher.bank.templates)
+    signatures = searcher.white_signatures(null)
+    alone = scores_of(
+        searcher.bank.templates,
+        signatures[:small] @ signatures[:small].T,
+        signatures[:small] @ vector,
+    )
+    key = ("calibration_offset", "cup")
+    gain = {
+        name: next(s for s in scores if (s.effect, s.instrument) == key)
+        for name, scores in (("small", alone), ("any", searcher.scores(null, vector)))
+    }
+    assert gain["any"].gain > 1.5 * gain["small"].gain
+    assert gain["any"].template.multiple in LARGER
+    # Amplitudes stay in units of the effect's own template.
+    estimate = gain["any"].amplitude * gain["any"].template.effect.templates[0]["offset"]
+    assert estimate == pytest.approx(-0.4, rel=0.5)
+
+
+def test_chance_on_the_borders_of_bins_is_no_information() -> None:
+    searcher = searched(with_offset(-0.4))
+    null = searcher.whitener(searcher.bank.without)
+    term = Term(catalogue()["calibration_offset"], "cup", {"offset": -0.4})
+    found = fit(null, SLOW, [term], searcher.bank.without)
+    errors = []
+    for seed in range(71, 77):
+        other = searched(with_offset(-0.4), seed)
+        null_of = other.whitener(other.bank.without)
+        estimate = fit(null_of, SLOW, [term], other.bank.without).terms[0].values["offset"]
+        errors.append(estimate + 0.4)
+    wide = float(np.sqrt(covariance_of(null, SLOW, found)[0, 0]))
+    assert wide > float(np.sqrt(found.covariance[0, 0]))
+    # Six estimates from other days: their scatter is what the deviation promises, within chance.
+    assert 0.3 < float(np.sqrt(np.mean(np.square(errors)))) / wide < 3.0
+
+
+def test_readings_that_repeat_tell_the_step_and_since_when() -> None:
+    coarse = {"step": 7.5, "origin": 2.0}
+    effect = catalogue()["quantisation"]
+    station = with_effect(STATION, effect, "vane", coarse, (160.0, 310.0))
+    (term,) = guesses_of(prepare(recorded(station, 71)), STATION)[("quantisation", "vane")]
+    assert term.values["step"] == pytest.approx(7.5, abs=0.01)
+    assert np.mod(term.values["origin"], 7.5) == pytest.approx(2.0, abs=0.01)
+    assert term.interval[0] == pytest.approx(160.0, abs=3.0)
+    assert term.interval[1] == pytest.approx(310.0, abs=3.0)
+    healthy = guesses_of(prepare(recorded(STATION, 71)), STATION)
+    assert ("quantisation", "vane") not in healthy
+
+
+def test_exchanged_wires_are_there_or_not() -> None:
+    found = diagnosed("sensor_swap", "vane", reversed=1.0)
+    assert found.verdict == "named"
+    assert [f.term.key for f in found.findings] == [("sensor_swap", "vane")]
+    assert found.findings[0].term.values == {"reversed": 1.0}
+    assert found.findings[0].term.interval == ALWAYS
+
+
+def test_a_day_that_is_loud_in_one_instrument_counts_in_part_for_the_others() -> None:
+    loud: Baseline = replace(default_baseline(STATION), loudest={"vane": 80.0, "cup": 5.0})
+    assert loud.loudness("vane") == 80.0
+    assert loud.loudness("cup") == loud.loudness("station") == LOUD_ELSEWHERE * 80.0
+    assert default_baseline(STATION).loudness("cup") == 0.0
+
+
+@pytest.mark.parametrize(("gain", "opposed"), [(1.1, False), (0.92, True)])
+def test_effects_that_take_each_other_back_explain_nothing(gain: float, opposed: bool) -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 72)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    # At 7 m/s eight per cent less of it and 0.55 m/s more are much the same.
+    terms = [
+        Term(catalogue()["calibration_offset"], "cup", {"offset": 0.55}),
+        Term(catalogue()["calibration_drift"], "cup", {"gain": gain}),
+    ]
+    both = fit(null, STATION, terms, None, iterations=0)
+    naming = Naming(both, null, null, null.of(searcher.bank.without), 0.0)
+    assert undo_each_other(naming, STATION) is opposed
