@@ -73,6 +73,24 @@ def test_a_vane_that_swings_past_the_opposite_direction_does_not_jump() -> None:
     assert np.abs(away).max() < np.pi
 
 
+@pytest.mark.parametrize(("begin", "end", "counts"), [(100.0, 106.0, False), (100.0, 190.0, True)])
+def test_a_vane_that_turned_round_the_other_way_says_nothing(
+    begin: float, end: float, counts: bool
+) -> None:
+    recording = recorded(STATION, 66)
+    at = (recording.angles["vane"].time - recording.start) * 1e-9
+    away = np.where((at >= begin) & (at < end), np.pi, 0.0)
+    comparison = prepare(_with_readings(recording, away))
+    if counts:
+        assert comparison.mask is None
+    else:
+        assert comparison.mask is not None
+        left_out = comparison.grid.centres[comparison.mask < 0.5]
+        assert left_out.min() == pytest.approx(begin, abs=4.0)
+        assert left_out.max() == pytest.approx(end, abs=4.0)
+        assert diagnose(_with_readings(recording, away), baseline()).verdict == "none"
+
+
 def test_the_form_of_no_change_is_no_signature() -> None:
     comparison = prepare(recorded(STATION, 64))
     simulated = comparison.simulate(STATION)

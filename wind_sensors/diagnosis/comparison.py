@@ -41,6 +41,7 @@ from wind_sensors.station.model import Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording, erratic
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 HIGHEST_FREQUENCY = 1.25
 """Residual series are compared below this frequency [Hz]; above, only spectra are."""
@@ -56,6 +57,13 @@ SHORTEST = 60.0
 
 FASTEST = 60.0
 """A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
+
+TURNED_ROUND = 0.5 * np.pi
+TURNING = 2.0
+LONGEST_TURNING = 20.0
+MOST_TURNING = 0.05
+"""A vane that is this far from its simulation [rad] turns round, with so much before and after [s];
+it takes no longer than the third [s], and this share of a record."""
 
 SIMULATIONS = 64
 """So many simulated channels are kept: a station that is tried again is not simulated again."""
@@ -442,8 +450,9 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
     )
     comparison = replace(comparison, expected=_expected(comparison))
     seen = _where_reference_is(recording, grid)
-    if seen is not None:
-        return comparison.within(seen)
+    followed = _where_vanes_follow(comparison)
+    if not seen.all() or not followed.all():
+        return comparison.within(seen * followed)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
 
 
@@ -457,16 +466,50 @@ def _expected(comparison: Comparison) -> dict[str, FloatArray]:
     }
 
 
-def _where_reference_is(recording: Recording, grid: Grid) -> FloatArray | None:
-    """Weights that are zero where the reference has a gap; None if it has none."""
+def _where_reference_is(recording: Recording, grid: Grid) -> FloatArray:
+    """Weights that are zero where the reference has a gap."""
+    weight = np.ones(grid.n)
     reference = recording.reference
     if reference is None:
-        return None
+        return weight
     time = grid.seconds(reference.time[np.isfinite(reference.velocity).all(axis=1)])
-    gaps = np.flatnonzero(np.diff(time) > LONGEST_GAP)
-    if gaps.size == 0:
-        return None
-    weight = np.ones(grid.n)
-    for k in gaps:
+    for k in np.flatnonzero(np.diff(time) > LONGEST_GAP):
         weight[(grid.centres > time[k] - 1.0) & (grid.centres < time[k + 1] + 1.0)] = 0.0
-    return np.clip(_smoothed(weight, 9) * 2.0 - 1.0, 0.0, 1.0)
+    return _soft(weight)
+
+
+def _where_vanes_follow(comparison: Comparison) -> FloatArray:
+    """Weights that are zero while a vane turns round to a wind from behind.
+
+    Whether it does so on one side or the other hangs on a hair: measured and simulated vane may be
+    half a turn apart for some seconds, which says nothing about the vane. What lasts longer or
+    comes often is no such thing.
+    """
+    grid = comparison.grid
+    weight = np.ones(grid.n)
+    seen = comparison.observe({}, comparison.recording.angles)
+    for name, series in seen.series.items():
+        away = np.abs(series / comparison.speed - comparison.expected[name])
+        begins, ends = _runs(_widened(away > TURNED_ROUND, round(TURNING / grid.dt)))
+        often = np.sum(ends - begins) > MOST_TURNING * grid.n
+        if often or np.any((ends - begins) * grid.dt > LONGEST_TURNING):
+            continue
+        for begin, end in zip(begins, ends, strict=True):
+            weight[begin:end] = 0.0
+    return _soft(weight)
+
+
+def _widened(inside: BoolArray, bins: int) -> BoolArray:
+    """True also within so many bins of what is."""
+    return np.convolve(inside, np.ones(2 * bins + 1), "same") > 0.5
+
+
+def _runs(inside: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """First bins and ends of the runs in which something holds."""
+    edges = np.diff(np.concatenate(([False], inside, [False])).astype(np.int8))
+    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+
+
+def _soft(weight: FloatArray) -> FloatArray:
+    """Weights of nought and one with soft edges."""
+    return weight if weight.all() else np.clip(_smoothed(weight, 9) * 2.0 - 1.0, 0.0, 1.0)

@@ -133,8 +133,14 @@ def is_noisy(naming: Naming, excess: Excess) -> bool:
 
 
 def _patchwork(naming: Naming) -> bool:
-    """Whether passing effects were pieced together on one instrument: nothing known fits."""
-    passing = [t.instrument for t in naming.fit.terms if t.interval != ALWAYS]
+    """Whether passing effects were pieced together on the same signals: nothing known fits."""
+    comparison = naming.whitener.comparison
+    passing = [
+        instrument
+        for term in naming.fit.terms
+        if term.interval != ALWAYS
+        for instrument in comparison.affected(comparison.station, term.instrument)
+    ]
     return len(passing) != len(set(passing))
 
 

@@ -52,6 +52,9 @@ FURTHER_EXACT_SHARE = 0.05
 LARGEST_EXACT_INEXACTNESS = 150.0
 """The same beside effects whose form is certain."""
 
+PASSING_BESIDE = 3.0
+"""So many times more, if it begins or ends inside the record: effects grow and fade themselves."""
+
 LEAST_SHARE_BESIDE = 0.02
 """What brings less than this share of the gain so far is the form of what brought that."""
 

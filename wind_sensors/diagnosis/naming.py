@@ -11,6 +11,7 @@ from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     EQUAL_SHARE,
+    PASSING_BESIDE,
     SMALLEST_BESIDE,
     Alternative,
     Judged,
@@ -190,8 +191,12 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: 
         return 0.0
     if current.terms and further.relative_size < SMALLEST_BESIDE:
         return np.inf
+    if not current.terms:
+        return 0.0
     nothing = whitener.of(searcher.bank.without)
-    return inexact(current, float(nothing @ nothing)) if current.terms else 0.0
+    own = inexact(current, float(nothing @ nothing))
+    passing = further.interval != ALWAYS and not further.effect.legible
+    return PASSING_BESIDE * own if passing else own
 
 
 def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
