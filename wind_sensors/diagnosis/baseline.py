@@ -19,7 +19,7 @@ CALIBRATED_FROM = 4.0
 """Slowest wind of a calibration [m/s] (IEC 61400-12-1). Below it the straight line through the
 calibration is continued to the starting speed, near which it cannot hold."""
 
-LOUD_ELSEWHERE = 0.7
+LOUD_ELSEWHERE = 0.5
 """Share that a healthy day counts which is loud in effects of other instruments."""
 
 FREQUENCIES = np.geomspace(0.0005, 1.25, 24)

@@ -42,7 +42,7 @@ may differ from the simulation's."""
 REMAINDER_SHARE = 0.02
 """Share of what there was to explain beyond which a structured remainder makes it unknown."""
 
-RIVAL_SHARE = 0.1
+RIVAL_SHARE = 0.2
 RIVAL_SCORE = 0.5
 """A smaller remainder, of this part of the score, with this share of it says as much: it rivals
 what was named."""
