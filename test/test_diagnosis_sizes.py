@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 
-from wind_sensors.diagnosis.baseline import LOUD_ELSEWHERE, Baseline
+from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.decision import undo_each_other
 from wind_sensors.diagnosis.effects import catalogue
@@ -108,10 +108,15 @@ def test_exchanged_wires_are_there_or_not() -> None:
     assert found.findings[0].term.interval == ALWAYS
 
 
-def test_a_day_that_is_loud_in_one_instrument_counts_in_part_for_the_others() -> None:
-    loud: Baseline = replace(default_baseline(STATION), loudest={"vane": 80.0, "cup": 5.0})
+@pytest.mark.parametrize(("days", "share"), [(2, 1.0), (3, 1.0), (6, 0.5), (12, 0.25)])
+def test_the_fewer_days_the_more_other_instruments_count(days: int, share: float) -> None:
+    loud: Baseline = replace(
+        default_baseline(STATION),
+        recordings=tuple(f"day-{k}" for k in range(days)),
+        loudest={"vane": 80.0, "cup": 5.0},
+    )
     assert loud.loudness("vane") == 80.0
-    assert loud.loudness("cup") == loud.loudness("station") == LOUD_ELSEWHERE * 80.0
+    assert loud.loudness("cup") == loud.loudness("station") == share * 80.0
     assert default_baseline(STATION).loudness("cup") == 0.0
 
 

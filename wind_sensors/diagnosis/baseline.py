@@ -19,8 +19,8 @@ CALIBRATED_FROM = 4.0
 """Slowest wind of a calibration [m/s] (IEC 61400-12-1). Below it the straight line through the
 calibration is continued to the starting speed, near which it cannot hold."""
 
-LOUD_ELSEWHERE = 0.5
-"""Share that a healthy day counts which is loud in effects of other instruments."""
+FEW_DAYS = 3
+"""With so many healthy days, what is loudest on any instrument counts for all; with more, less."""
 
 FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 """Frequencies at which a baseline keeps its curves [Hz]."""
@@ -109,10 +109,11 @@ class Baseline:
     def loudness(self, instrument: str) -> float:
         """What an effect of an instrument promises on the loudest healthy day.
 
-        A day that is loud elsewhere counts in part: what disturbs one signal reaches others.
+        A few days show little of each instrument: what they show of others stands in, in part.
         """
+        elsewhere = min(1.0, FEW_DAYS / max(len(self.recordings), 1))
         overall = max(self.loudest.values(), default=0.0)
-        return max(self.loudest.get(instrument, 0.0), LOUD_ELSEWHERE * overall)
+        return max(self.loudest.get(instrument, 0.0), elsewhere * overall)
 
     def for_station(self, station: Station) -> Baseline:
         """The same baseline for a recording whose station file may say otherwise.

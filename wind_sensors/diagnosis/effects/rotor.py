@@ -164,6 +164,7 @@ ROTOR_INERTIA = Effect(
     applies=_is_rotor,
     update=_inertia,
     form_error=0.15,
+    standing_in_calm=0.8,
     templates=({"inertia_factor": 1.3},),
     confusable={
         "timestamp_latency": "a speed sweep: the lag of inertia is a length, of a clock a time",
