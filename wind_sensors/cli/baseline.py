@@ -79,7 +79,7 @@ def read_baseline(path: Path) -> Baseline:
         ) from None
     except ValueError:
         raise UserError(
-            "this is not a baseline.",
+            "this is not a baseline of this version.",
             str(path),
             "Make one with `wind baseline HEALTHY... -o FILE`.",
         ) from None

@@ -373,7 +373,7 @@ def _baseline(file: str) -> Baseline | None:
         reason = f"the baseline cannot be read ({problem.strerror})."
         raise UserError(reason, file, remedy) from None
     except ValueError:
-        raise UserError("this is not a baseline.", file, remedy) from None
+        raise UserError("this is not a baseline of this version.", file, remedy) from None
 
 
 def _process_beside() -> ProcessPoolExecutor:
