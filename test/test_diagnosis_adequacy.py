@@ -10,12 +10,12 @@ from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import made_up
+from wind_sensors.diagnosis.decision import borne_out, made_up
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
 from wind_sensors.diagnosis.findings import Finding
-from wind_sensors.diagnosis.fitting import Term, fit, planted
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.search import searcher_of
@@ -170,6 +170,33 @@ def test_two_effects_must_stand_out_one_by_one(
     comparison = prepare(recorded(STATION, 65))
     found = tuple(_finding(*e, s, p) for e, s, p in zip(effects, shares, ps, strict=True))
     assert made_up(found, comparison) is verdict
+
+
+@pytest.mark.parametrize(
+    ("effect", "interval", "removed", "p", "borne"),
+    [
+        (OFFSET, ALWAYS, 0.9, 0.4, True),
+        (OFFSET, ALWAYS, 0.6, 0.002, False),
+        (OFFSET, (300.0, None), 0.3, 0.002, True),
+        (OFFSET, (300.0, None), 0.3, 0.4, False),
+        (("wake_shadow", "cup"), ALWAYS, 0.3, 0.002, True),
+    ],
+)
+def test_what_acts_seldom_cannot_be_asked_of_every_block(
+    effect: tuple[str, str],
+    interval: tuple[float, float | None],
+    removed: float,
+    p: float,
+    borne: bool,
+) -> None:
+    found = _finding(*effect, 0.9, p)
+    assert found.proof is not None
+    found = replace(
+        found,
+        term=replace(found.term, interval=interval),
+        proof=replace(found.proof, excess_removed=removed),
+    )
+    assert borne_out((found,)) is borne
 
 
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:

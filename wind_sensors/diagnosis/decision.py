@@ -188,9 +188,16 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
 
 
 def borne_out(findings: tuple[Finding, ...]) -> bool:
-    """Whether blocks that were not fitted speak for the findings."""
+    """Whether blocks that were not fitted speak for the findings.
+
+    What acts in a few minutes or in one sector may show in the fitted blocks only, or only in the
+    others: it has to stand out instead.
+    """
     proofs = [f.proof for f in findings if f.proof is not None]
-    return not proofs or proofs[0].excess_removed > LEAST_REMOVED
+    if not proofs or proofs[0].excess_removed > LEAST_REMOVED:
+        return True
+    seldom = any(f.term.interval != ALWAYS or f.term.effect.occasional for f in findings)
+    return seldom and stands_out(findings)
 
 
 def stands_out(findings: tuple[Finding, ...]) -> bool:
