@@ -163,9 +163,16 @@ def _leader(
 
 
 def _with_sharp_intervals(
-    searcher: Searcher, ranked: Sequence[Judged], named: Simulated | None
+    searcher: Searcher, null: Whitener, ranked: Sequence[Judged], named: Simulated | None
 ) -> list[Judged]:
-    """The same explanations with beginnings and ends where they fit best; best first."""
+    """The same explanations with beginnings and ends where they fit best; best first.
+
+    Args:
+        searcher: The search.
+        null: Of the terms so far.
+        ranked: Explanations with one more.
+        named: Simulation of the terms so far; None: there are none.
+    """
 
     def sharper(one: Judged) -> Fit:
         return refined_interval(searcher, one.whitener, one.fit)
@@ -177,7 +184,28 @@ def _with_sharp_intervals(
     ]
     lasting = [r for r in ranked if not any(r is p for p in passing)]
     sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
-    return sorted([*lasting, *sharp], key=lambda r: r.evidence)
+    fuller = [f for f in searcher.refit_all(null, _fuller(searcher, sharp)) if plausible(f)]
+    return sorted([*lasting, *sharp, *judged(searcher, fuller, named)], key=lambda r: r.evidence)
+
+
+def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
+    """Explanations with an effect that contains the last one in its place, in the same interval.
+
+    Of several effects that begin at the same time the simplest is screened first.
+    """
+    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
+    found: dict[tuple[str, str], list[Term]] = {}
+    for one in passing:
+        *others, last = one.fit.terms
+        for effect in searcher.effects.values():
+            key = (effect.name, last.instrument)
+            if last.effect.name not in effect.contains or key not in possible or key in found:
+                continue
+            shared = {p.name: last.values[p.name] for p in effect.parameters
+                      if p.name in last.values}
+            values = {**effect.templates[0], **shared}
+            found[key] = [*others, replace(last, effect=effect, values=values)]
+    return list(found.values())
 
 
 def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: Term) -> float:
@@ -291,7 +319,7 @@ def _greedy(
         ranked = judged(searcher, pool, named, roughly=True)
         ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
         ranked = [r for r in ranked if plausible(r.fit)]
-        ranked = _with_sharp_intervals(searcher, ranked, named)
+        ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
         leader = _leader(searcher, whitener, current, ranked)
         if leader is None:
             break
