@@ -7,7 +7,7 @@ demo: environment
 	$(VENV)/wind demo --force
 
 test: environment
-	$(VENV)/python -m pytest
+	$(VENV)/python -m pytest -n 2 --dist loadfile
 
 lint: environment
 	$(PYTHON) scripts/bootstrap.py test dev

@@ -56,7 +56,7 @@ setup(
     install_requires=["setuptools", *NUMBERS, *FILES, *PEOPLE],
     extras_require={
         "ros": ROS_WHEELS,
-        "test": ["pytest>=7.0", "hypothesis>=6.70"],
+        "test": ["pytest>=7.0", "pytest-xdist>=3.0", "hypothesis>=6.70"],
         "dev": ["mypy>=1.10", "ruff>=0.6", "scipy-stubs"],
         "peers": ["pysindy>=2.0", "sysidentpy>=0.9", "scikit-learn>=1.3"],
     },

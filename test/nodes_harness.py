@@ -16,7 +16,12 @@ from rclpy.parameter import Parameter
 from wind_sensors.nodes.execution import make_executor
 from wind_sensors.nodes.quality import input_quality
 
-_DOMAINS = itertools.count(10 + os.getpid() % 60)
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+_WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+_DOMAINS = itertools.count(os.getppid() * _WORKERS + _WORKER, _WORKERS)
+"""Test processes that run side by side share their parent and never meet in one domain."""
+
+_MOST_DOMAINS = 48
 
 _BATCH = 20
 """Callbacks of one node before it is the next one's turn."""
@@ -28,7 +33,7 @@ class Graph:
     def __init__(self, tmp_path: Any, monkeypatch: Any) -> None:
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
-        self.domain = 1 + next(_DOMAINS) % 90
+        self.domain = 1 + next(_DOMAINS) % _MOST_DOMAINS
         self._contexts: list[Context] = []
         self._executors: list[Any] = []
         self._nodes: list[Any] = []

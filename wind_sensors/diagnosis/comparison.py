@@ -13,8 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.counted_time import where_reference_is, where_vanes_follow
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.observation import (
     LOWEST_BAND_FREQUENCY,
@@ -41,7 +43,6 @@ from wind_sensors.station.model import Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording, erratic
 
 FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 HIGHEST_FREQUENCY = 1.25
 """Residual series are compared below this frequency [Hz]; above, only spectra are."""
@@ -49,21 +50,15 @@ HIGHEST_FREQUENCY = 1.25
 LOW_END = 0.02
 """Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
 
-LONGEST_GAP = 1.0
-"""Where the reference is silent for longer [s], nothing is compared."""
-
 SHORTEST = 60.0
 """A recording needs this much time in common with its reference [s]."""
 
 FASTEST = 60.0
 """A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
 
-TURNED_ROUND = 0.5 * np.pi
-TURNING = 2.0
-LONGEST_TURNING = 20.0
-MOST_TURNING = 0.05
-"""A vane that is this far from its simulation [rad] turns round, with so much before and after [s];
-it takes no longer than the third [s], and this share of a record."""
+DIRECTION_TIME = 60.0
+SPEED_TIME = 10.0
+"""Direction and speed are slow ones over these times [s]."""
 
 SIMULATIONS = 64
 """So many simulated channels are kept: a station that is tried again is not simulated again."""
@@ -116,15 +111,6 @@ class Trust:
     deviation: FloatArray
     statistics_mean: FloatArray
     statistics_deviation: FloatArray
-
-
-def _smoothed(values: FloatArray, width: int) -> FloatArray:
-    """Running mean with mirrored ends."""
-    width = max(1, min(width, values.size - 1)) | 1
-    half = width // 2
-    padded = np.concatenate((values[half:0:-1], values, values[-2 : -half - 2 : -1]))
-    total = np.concatenate(([0.0], np.cumsum(padded)))
-    return np.asarray((total[width:] - total[:-width]) / width, dtype=np.float64)[: values.size]
 
 
 @dataclass(frozen=True)
@@ -431,10 +417,14 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
     at = np.arange(len(drive)) * drive.dt
     coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
     speed = np.hypot(flow[:, 0], flow[:, 1])
-    x = np.interp(grid.centres, at, _smoothed(flow[:, 0], int(60.0 / drive.dt)))
-    y = np.interp(grid.centres, at, _smoothed(flow[:, 1], int(60.0 / drive.dt)))
+
+    def slowly(values: FloatArray, seconds: float) -> FloatArray:
+        width = min(int(seconds / drive.dt), values.size - 1) | 1
+        return np.interp(grid.centres, at, uniform_filter1d(values, width, mode="mirror"))
+
+    x, y = slowly(flow[:, 0], DIRECTION_TIME), slowly(flow[:, 1], DIRECTION_TIME)
     slow_direction = np.unwrap(np.arctan2(-y, -x))
-    slow_speed = np.interp(grid.centres, at, _smoothed(speed, int(10.0 / drive.dt)))
+    slow_speed = slowly(speed, SPEED_TIME)
     empty = Simulated({}, {}, {})
     comparison = Comparison(
         recording=recording,
@@ -449,10 +439,10 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
         memory=DriveMemory(drive),
     )
     comparison = replace(comparison, expected=_expected(comparison))
-    seen = _where_reference_is(recording, grid)
-    followed = _where_vanes_follow(comparison)
-    if not seen.all() or not followed.all():
-        return comparison.within(seen * followed)
+    known_wind = where_reference_is(recording, grid)
+    followed = where_vanes_follow(_beside_expected(comparison), grid)
+    if not known_wind.all() or not followed.all():
+        return comparison.within(known_wind * followed)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
 
 
@@ -466,50 +456,9 @@ def _expected(comparison: Comparison) -> dict[str, FloatArray]:
     }
 
 
-def _where_reference_is(recording: Recording, grid: Grid) -> FloatArray:
-    """Weights that are zero where the reference has a gap."""
-    weight = np.ones(grid.n)
-    reference = recording.reference
-    if reference is None:
-        return weight
-    time = grid.seconds(reference.time[np.isfinite(reference.velocity).all(axis=1)])
-    for k in np.flatnonzero(np.diff(time) > LONGEST_GAP):
-        weight[(grid.centres > time[k] - 1.0) & (grid.centres < time[k + 1] + 1.0)] = 0.0
-    return _soft(weight)
-
-
-def _where_vanes_follow(comparison: Comparison) -> FloatArray:
-    """Weights that are zero while a vane turns round to a wind from behind.
-
-    Whether it does so on one side or the other hangs on a hair: measured and simulated vane may be
-    half a turn apart for some seconds, which says nothing about the vane. What lasts longer or
-    comes often is no such thing.
-    """
-    grid = comparison.grid
-    weight = np.ones(grid.n)
-    seen = comparison.observe({}, comparison.recording.angles)
-    for name, series in seen.series.items():
-        away = np.abs(series / comparison.speed - comparison.expected[name])
-        begins, ends = _runs(_widened(away > TURNED_ROUND, round(TURNING / grid.dt)))
-        often = np.sum(ends - begins) > MOST_TURNING * grid.n
-        if often or np.any((ends - begins) * grid.dt > LONGEST_TURNING):
-            continue
-        for begin, end in zip(begins, ends, strict=True):
-            weight[begin:end] = 0.0
-    return _soft(weight)
-
-
-def _widened(inside: BoolArray, bins: int) -> BoolArray:
-    """True also within so many bins of what is."""
-    return np.convolve(inside, np.ones(2 * bins + 1), "same") > 0.5
-
-
-def _runs(inside: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """First bins and ends of the runs in which something holds."""
-    edges = np.diff(np.concatenate(([False], inside, [False])).astype(np.int8))
-    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
-
-
-def _soft(weight: FloatArray) -> FloatArray:
-    """Weights of nought and one with soft edges."""
-    return weight if weight.all() else np.clip(_smoothed(weight, 9) * 2.0 - 1.0, 0.0, 1.0)
+def _beside_expected(comparison: Comparison) -> list[FloatArray]:
+    """Measured minus simulated angle of each vane [rad]."""
+    seen = comparison.observe({}, comparison.recording.angles).series
+    return [
+        series / comparison.speed - comparison.expected[name] for name, series in seen.items()
+    ]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from wind_sensors.estimation import EstimatorSettings
     from wind_sensors.nodes.recorder import RecorderNode
 
-_DOMAIN = 40
+_DOMAIN = 50
 _FASTEST = 100.0
 """No topic carries more messages a simulated second than this."""
 
@@ -127,7 +127,7 @@ def run_live(
         UserError: There is no rclpy, or a node failed.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ["ROS_DOMAIN_ID"] = str(_DOMAIN + os.getpid() % 60)
+    os.environ["ROS_DOMAIN_ID"] = str(_DOMAIN + os.getpid() % 50)
     station = load_station(station_file)
     begin = recording_start(station)
     # Queues hold the whole run: whoever falls behind gets everything later, and nothing is dropped.

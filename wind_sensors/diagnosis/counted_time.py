@@ -1,0 +1,88 @@
+"""Which seconds of a recording count when it is compared with a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from wind_sensors.diagnosis.observation import Grid
+from wind_sensors.station.signals import Recording
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+LONGEST_GAP = 1.0
+"""Where the reference is silent for longer [s], nothing is compared."""
+
+BESIDE_GAP = 1.0
+"""Nor so close to such a gap [s]."""
+
+TURNED_ROUND = 0.5 * np.pi
+"""A vane that is this far from its simulation [rad] turns round."""
+
+BESIDE_TURNING = 2.0
+"""So much before and after belongs to it [s]."""
+
+LONGEST_TURNING = 20.0
+"""What takes longer [s] is no turning round."""
+
+MOST_TURNING = 0.05
+"""Nor is what takes a larger share of a recording."""
+
+EDGE = 9
+"""Weights rise and fall within so many bins."""
+
+
+def where_reference_is(recording: Recording, grid: Grid) -> FloatArray:
+    """Weights that are zero where the reference has a gap, shape (n,)."""
+    weight = np.ones(grid.n)
+    reference = recording.reference
+    if reference is None:
+        return weight
+    time = grid.seconds(reference.time[np.isfinite(reference.velocity).all(axis=1)])
+    for k in np.flatnonzero(np.diff(time) > LONGEST_GAP):
+        begin, end = time[k] - BESIDE_GAP, time[k + 1] + BESIDE_GAP
+        weight[(grid.centres > begin) & (grid.centres < end)] = 0.0
+    return _soft(weight)
+
+
+def where_vanes_follow(differences: Iterable[FloatArray], grid: Grid) -> FloatArray:
+    """Weights that are zero while a vane turns round to a wind from behind, shape (n,).
+
+    Whether it does so on one side or the other hangs on a hair: measured and simulated vane may be
+    half a turn apart for some seconds, which says nothing about the vane. What lasts longer or
+    comes often is no such thing.
+
+    Args:
+        differences: Of each vane, measured minus simulated angle at the bins [rad].
+        grid: Bins.
+    """
+    weight = np.ones(grid.n)
+    for difference in differences:
+        away = np.abs(difference) > TURNED_ROUND
+        begins, ends = _runs(_widened(away, round(BESIDE_TURNING / grid.dt)))
+        often = np.sum(ends - begins) > MOST_TURNING * grid.n
+        if often or np.any((ends - begins) * grid.dt > LONGEST_TURNING):
+            continue
+        for begin, end in zip(begins, ends, strict=True):
+            weight[begin:end] = 0.0
+    return _soft(weight)
+
+
+def _widened(inside: BoolArray, bins: int) -> BoolArray:
+    """True also within so many bins of what is."""
+    return np.convolve(inside, np.ones(2 * bins + 1), "same") > 0.5
+
+
+def _runs(inside: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """First bins and ends of the runs in which something holds."""
+    edges = np.diff(np.concatenate(([False], inside, [False])).astype(np.int8))
+    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+
+
+def _soft(weight: FloatArray) -> FloatArray:
+    """Weights of nought and one with soft edges, nought where they were."""
+    return np.clip(2.0 * uniform_filter1d(weight, EDGE, mode="mirror") - 1.0, 0.0, 1.0)
