@@ -199,6 +199,14 @@ def test_what_acts_seldom_cannot_be_asked_of_every_block(
     assert borne_out((found,)) is borne
 
 
+def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:
+    found = _finding("wake_shadow", "cup", 0.9, 0.002)
+    assert found.proof is not None
+    for rival, borne in ((0.2, True), (0.5, False)):
+        proof = replace(found.proof, excess_removed=0.4, placebo_removed=rival)
+        assert borne_out((replace(found, proof=proof),)) is borne
+
+
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
     rival = replace(_finding(*ASYMMETRY, 0.9, 0.5), proof=None)
     found = (_finding(*OFFSET, 0.9, 0.002), rival)

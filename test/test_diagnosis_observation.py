@@ -66,6 +66,15 @@ def test_a_loose_wiper_is_erratic_and_nothing_else() -> None:
     assert not found[~near].any()
 
 
+def test_no_chance_reading_survives_a_long_stay_in_a_gap() -> None:
+    rng = np.random.default_rng(6)
+    angle = 0.1 * rng.standard_normal(3000)
+    loose = np.zeros(3000, dtype=bool)
+    loose[600:2400] = True
+    angle[loose] = rng.uniform(-np.pi, np.pi, loose.sum())
+    assert erratic(_readings(angle))[loose].all()
+
+
 def test_sparse_readings_are_not_judged_by_their_steps() -> None:
     time = np.arange(100, dtype=np.int64) * SECOND
     assert not erratic(Angles(time, np.where(np.arange(100) % 2, 3.0, 0.0))).any()

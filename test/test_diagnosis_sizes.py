@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.explanation import Naming
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
+from wind_sensors.diagnosis.naming import is_its_moment
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.signatures import LARGER
@@ -98,6 +99,32 @@ def test_readings_that_repeat_tell_the_step_and_since_when() -> None:
     assert term.interval[1] == pytest.approx(310.0, abs=3.0)
     healthy = guesses_of(prepare(recorded(STATION, 71)), STATION)
     assert ("quantisation", "vane") not in healthy
+
+
+def test_coarse_steps_are_not_tried_on_readings_that_have_none() -> None:
+    station = with_effect(STATION, catalogue()["vane_friction"], "vane", {"friction_speed": 3.0})
+    comparison = prepare(recorded(station, 72))
+    guesses = guesses_of(comparison, STATION)
+    searcher = searcher_of(comparison, default_baseline(STATION), catalogue(), guesses)
+    null = searcher.whitener(searcher.bank.without)
+    vector = null.of(searcher.bank.without)
+    scores = searcher.scores(null, vector)
+    tried = [starts[0].key for starts in searcher.single_candidates(null, vector, len(scores))]
+    assert ("vane_friction", "vane") in tried
+    assert ("quantisation", "vane") in {(s.effect, s.instrument) for s in scores}
+    assert ("quantisation", "vane") not in tried
+
+
+@pytest.mark.parametrize(("interval", "same"), [((158.0, 204.0), True), ((40.0, 90.0), False)])
+def test_what_passes_while_another_effect_shows_is_its_form(
+    interval: tuple[float, float], same: bool
+) -> None:
+    searcher = searched(SLOW)
+    turned = Term(catalogue()["vane_offset"], "vane", {"offset": 20.0}, (160.0, 200.0))
+    null = searcher.whitener(searcher.bank.without)
+    current = fit(null, SLOW, [turned], searcher.bank.without, iterations=1)
+    further = Term(catalogue()["vane_eccentricity"], "vane", {"sine": 5.0, "cosine": 0.0}, interval)
+    assert is_its_moment(searcher, current, further) is same
 
 
 def test_exchanged_wires_are_there_or_not() -> None:

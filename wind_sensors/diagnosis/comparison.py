@@ -253,8 +253,9 @@ class Comparison:
                 statistics[channel.name] = np.concatenate((bands, intervals))
             else:
                 readings = angles[channel.instrument]
+                expected = self.expected.get(channel.name)
                 deviation = self._nearest_turn(
-                    channel, angle_series(readings, self.direction, self.grid)
+                    channel, angle_series(readings, self.direction, self.grid, expected)
                 )
                 values = deviation * self.speed
                 full = spectra.to_cosine(self.masked(values))

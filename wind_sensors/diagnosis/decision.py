@@ -191,13 +191,14 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     """Whether blocks that were not fitted speak for the findings.
 
     What acts in a few minutes or in one sector may show in the fitted blocks only, or only in the
-    others: it has to stand out instead.
+    others: it has to stand out instead, and do there what the next-best explanation does.
     """
-    proofs = [f.proof for f in findings if f.proof is not None]
-    if not proofs or proofs[0].excess_removed > LEAST_REMOVED:
+    proof = next((f.proof for f in findings if f.proof is not None), None)
+    if proof is None or proof.excess_removed > LEAST_REMOVED:
         return True
     seldom = any(f.term.interval != ALWAYS or f.term.effect.occasional for f in findings)
-    return seldom and stands_out(findings)
+    rival = -np.inf if proof.placebo_removed is None else proof.placebo_removed
+    return seldom and stands_out(findings) and proof.excess_removed >= rival
 
 
 def stands_out(findings: tuple[Finding, ...]) -> bool:

@@ -32,6 +32,9 @@ LOUDEST_FACTOR = 1.2
 PASSING_GAIN = 25.0
 """What an effect must bring that begins or ends inside the record: any of many may do."""
 
+PASSING_SMOOTH_GAIN = 40.0
+"""The same if it smooths: for some minutes the reference sees other eddies than the instrument."""
+
 PASSING_FORM_GAIN = 60.0
 """The same with several parameters: in a few minutes of wind from a few directions they fit many a
 wandering of the reference with sizes that undo each other."""
@@ -104,7 +107,9 @@ def passing_gain(term: Term) -> float:
     if term.interval == ALWAYS or term.effect.legible:
         return 0.0
     graded = sum(p.healthy is not None and p.minimum > 0.0 for p in term.effect.parameters)
-    return PASSING_FORM_GAIN if graded > 1 else PASSING_GAIN
+    if graded > 1:
+        return PASSING_FORM_GAIN
+    return PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN
 
 
 def inexact(current: Fit, nothing: float) -> float:

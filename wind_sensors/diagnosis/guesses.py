@@ -370,14 +370,43 @@ def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     if np.mean(wrong) < LEAST_ERRATIC:
         return []
     centre, width = _sector(comparison, channel, wrong)
-    return [_gap(channel.instrument, centre, share * width, 2) for share in NARROWER]
+    sectors = [(centre, share * width) for share in NARROWER]
+    return [
+        _gap(channel.instrument, *sector, 2)
+        for sector in (*_mostly(comparison, channel, wrong, centre), *sectors)
+    ]
+
+
+def _mostly(
+    comparison: Comparison, channel: Channel, where: BoolArray, inside: float
+) -> list[tuple[float, float]]:
+    """Centre and width of the sector in which some readings outnumber others [deg]."""
+    away = np.degrees(_headings(comparison, channel)) - inside
+    away = np.mod(away + 180.0, 360.0) - 180.0
+    bins = np.arange(-180.0, 181.0)
+    some, _ = np.histogram(away[where], bins)
+    every, _ = np.histogram(away, bins)
+    most = 2 * some > every
+    if not most[180]:
+        return []
+    # No reading says nothing of a degree; the last ones that speak for the sector bound it.
+    others = np.flatnonzero((every > 0) & ~most)
+    low, high = others[others < 180].max(initial=-1) + 1, others[others > 180].min(initial=360)
+    spoken = low + np.flatnonzero(most[low:high])
+    low, high = int(spoken[0]), int(spoken[-1]) + 1
+    return [(inside + 0.5 * (low + high) - 180.0, float(high - low))]
+
+
+def _headings(comparison: Comparison, channel: Channel) -> FloatArray:
+    """Where the nose should be at each reading [rad]."""
+    time = comparison.recording.angles[channel.instrument].time
+    heading = comparison.direction + comparison.expected.get(channel.name, 0.0)
+    return np.interp(comparison.grid.seconds(time), comparison.grid.centres, heading)
 
 
 def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple[float, float]:
     """Centre and width of the sector in which the nose should be at some readings [deg]."""
-    time = comparison.recording.angles[channel.instrument].time[where]
-    heading = comparison.direction + comparison.expected.get(channel.name, 0.0)
-    at = np.interp(comparison.grid.seconds(time), comparison.grid.centres, heading)
+    at = _headings(comparison, channel)[where]
     centre = float(np.angle(np.mean(np.exp(1j * at))))
     away = np.angle(np.exp(1j * (at - centre)))
     low, middle, high = np.degrees(np.quantile(away, (0.1, 0.5, 0.9)))

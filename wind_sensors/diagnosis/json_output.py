@@ -8,6 +8,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.verdict import Diagnosis
 
 
@@ -84,15 +85,24 @@ def finding_json(finding: Finding, length: float) -> dict[str, Any]:
     if finding.set_number:
         out["set"] = finding.set_number
     if finding.proof is not None:
-        proof = finding.proof
-        out["proof"] = {
-            "score_before": _rounded(proof.before),
-            "score_after": _rounded(proof.after),
-            "score_floor": _rounded(proof.floor),
-            "excess_removed": _rounded(proof.excess_removed),
-            "interval": [_rounded(proof.low), _rounded(proof.high)],
-            "placebo_removed": (
-                None if proof.placebo_removed is None else _rounded(proof.placebo_removed)
-            ),
-        }
+        out["proof"] = _proof_json(finding.proof)
     return out
+
+
+def _proof_json(proof: Proof) -> dict[str, object]:
+    def number(value: float | None) -> float | None:
+        return None if value is None else _rounded(value)
+
+    correlation = proof.wind_correlation
+    return {
+        "score_before": _rounded(proof.before),
+        "score_after": _rounded(proof.after),
+        "score_floor": _rounded(proof.floor),
+        "excess_removed": _rounded(proof.excess_removed),
+        "interval": [_rounded(proof.low), _rounded(proof.high)],
+        "placebo_removed": number(proof.placebo_removed),
+        "curve_removed": number(proof.curve_removed),
+        "calm_to_windy_removed": number(proof.transfer),
+        "coverage_of_95": number(proof.coverage),
+        "correlation_with_wind": correlation and [_rounded(c) for c in correlation],
+    }

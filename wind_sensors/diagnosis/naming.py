@@ -66,6 +66,12 @@ WORTH_ANOTHER_TURN = 14.0
 """Largest linear score below which no further effect is looked for."""
 
 
+LONGEST_MOMENT = 0.25
+OF_A_MOMENT = 0.7
+"""An effect of which more than the second share shows in a part of the record that is no longer
+than the first has its moment there."""
+
+
 def name(
     searcher: Searcher, progress: Callable[[float], None] | None = None
 ) -> Naming:
@@ -217,14 +223,35 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: 
     }
     if further.instrument not in (reached | {STATION, PLATFORM}):
         return 0.0
-    if current.terms and further.relative_size < SMALLEST_BESIDE:
-        return np.inf
     if not current.terms:
         return 0.0
+    if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
+        return np.inf
     nothing = whitener.of(searcher.bank.without)
     own = inexact(current, float(nothing @ nothing))
     passing = further.interval != ALWAYS and not further.effect.legible
     return PASSING_BESIDE * own if passing else own
+
+
+def is_its_moment(searcher: Searcher, current: Fit, further: Term) -> bool:
+    """Whether a passing effect holds just while the effects so far show.
+
+    What a vane reads in a gap, or a rotor in a wake, need not be what is simulated there.
+    """
+    if further.interval == ALWAYS:
+        return False
+    comparison = searcher.comparison
+    at = comparison.grid.centres + comparison.drive.elapsed
+    begin, end = further.interval
+    inside = (at >= begin) & (at < (np.inf if end is None else end))
+    if np.mean(inside) > LONGEST_MOMENT:
+        return False
+    shown = sum(
+        (current.simulated.series[c.name] - searcher.bank.without.series[c.name]) ** 2
+        for c in comparison.channels
+        if c.instrument in comparison.affected(searcher.station, further.instrument)
+    )
+    return float(np.sum(shown * inside)) > OF_A_MOMENT * float(np.sum(shown))
 
 
 def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:

@@ -162,21 +162,25 @@ def _turns_at(at: FloatArray, time: FloatArray, turns: FloatArray, slots: int) -
     return out
 
 
-def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
+def angle_series(
+    angles: Angles, around: FloatArray, grid: Grid, expected: FloatArray | None = None
+) -> FloatArray:
     """Mean reading in each bin, as the deviation from a slow heading [rad], shape (n,).
 
     Args:
         angles: Readings.
         around: Slow heading at the bins' centres [rad, continuous], shape (n,).
         grid: Bins.
+        expected: Deviation that stands in where readings jump about, shape (n,); None: none does.
 
     Returns:
         Deviations within (-pi, pi], continued where a bin holds no reading.
     """
+    loose = erratic(angles)
     time = grid.seconds(angles.time)
-    usable = np.isfinite(angles.angle) & ~erratic(angles)
-    time, reading = time[usable], angles.angle[usable]
-    index = np.floor(time / grid.dt).astype(np.intp)
+    place = np.floor(time / grid.dt).astype(np.intp)
+    usable = np.isfinite(angles.angle) & ~loose
+    index, reading = place[usable], angles.angle[usable]
     inside = (index >= 0) & (index < grid.n)
     index, reading = index[inside], reading[inside]
     deviation = reading - around[index]
@@ -186,6 +190,12 @@ def angle_series(angles: Angles, around: FloatArray, grid: Grid) -> FloatArray:
     if not filled.any():
         return np.zeros(grid.n)
     mean = np.arctan2(s, c)
+    if expected is not None and loose.any():
+        unknown = np.zeros(grid.n, dtype=np.bool_)
+        unknown[place[loose & (place >= 0) & (place < grid.n)]] = True
+        unknown &= ~filled
+        mean[unknown] = expected[unknown]
+        filled |= unknown
     if not filled.all():
         mean = np.interp(np.arange(grid.n), np.flatnonzero(filled), mean[filled])
     return np.asarray(mean, dtype=np.float64)

@@ -39,7 +39,7 @@ NEAR_AN_END = 8.0
 
 WINDOW_CANDIDATES = 4
 WINDOW_ADVANTAGE = 15.0
-SMOOTHING_WINDOW_ADVANTAGE = 120.0
+SMOOTHING_WINDOW_ADVANTAGE = 30.0
 LEAST_WINDOW_GAIN = 24.0
 """What an effect must promise in a part of the record to be fitted there."""
 

@@ -9,21 +9,32 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
-from wind_sensors.diagnosis.fitting import ROUGHLY, Term, fit, planted
+from wind_sensors.diagnosis.fitting import Term, planted
+from wind_sensors.diagnosis.held_out import (
+    Fold,
+    Side,
+    block_masks,
+    curves,
+    fold_of,
+    least_left,
+    removed,
+    scored,
+    side_of,
+    speed_of,
+    wind_masks,
+)
 from wind_sensors.diagnosis.whitening import Whitener
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 
-BLOCKS = 12
-"""The record is cut into so many blocks; every other one is fitted, the rest is scored."""
+LONGEST_LAG = 10.0
+"""The residual is held against the wind up to so much later and earlier [s]."""
 
-GAP = 4.0
-"""Between a fitted and a scored block [s]."""
+WITHIN = 1.96
+"""Standard deviations that hold 95 % of normal numbers."""
 
-_RAMP = 2.0
-_DRAWS = 400
+DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -37,6 +48,14 @@ class Proof:
         excess_removed: Share of the excess misfit that the effects remove on the scored blocks.
         low, high: 95 % block-bootstrap interval of that share.
         placebo_removed: Share that the next-best explanation removes; None: there was none.
+        curve_removed: Share that smooth curves over the wind's speed remove, added to every channel
+            with as many coefficients as the effects have parameters; None: not asked.
+        transfer: Share removed in the windier half of the blocks by what was fitted to the calmer
+            half; None: the wind hardly changed.
+        coverage: Share of the scored residuals, with the effects, within what holds 95 % on a
+            healthy day; None: not asked.
+        wind_correlation: Largest correlation of the scored residual with the wind at any lag,
+            without and with the effects; None: not asked.
     """
 
     before: float
@@ -46,89 +65,10 @@ class Proof:
     low: float
     high: float
     placebo_removed: float | None
-
-
-def block_masks(comparison: Comparison) -> tuple[FloatArray, FloatArray]:
-    """Two sets of blocks with gaps between them, with soft edges."""
-    length = comparison.grid.n * comparison.grid.dt
-    at = comparison.grid.centres
-    width = length / BLOCKS
-    within = np.mod(at, width)
-    edge = np.minimum(within, width - within) - 0.5 * GAP
-    soft = np.clip(edge / _RAMP, 0.0, 1.0)
-    soft = 0.5 - 0.5 * np.cos(np.pi * soft)
-    number = np.floor(at / width).astype(np.intp)
-    even = np.where(number % 2 == 0, soft, 0.0)
-    return even, np.where(number % 2 == 1, soft, 0.0)
-
-
-def _masked_whitener(whitener: Whitener, mask: FloatArray) -> Whitener:
-    """The noise-only null within the blocks of a mask."""
-    share = float(np.mean(mask**2))
-    trust: dict[str, Trust] = {}
-    for channel in whitener.comparison.channels:
-        t = whitener.trust[channel.name]
-        trust[channel.name] = replace(
-            t,
-            deviation=t.deviation * np.sqrt(share),
-            statistics_deviation=t.statistics_deviation / np.sqrt(max(share, 0.1)),
-        )
-    comparison = whitener.comparison.within(mask)
-    return Whitener(comparison, trust, np.zeros((0, 0)), np.zeros(0), np.zeros(1))
-
-
-def _block_costs(whitener: Whitener, vector: FloatArray) -> tuple[FloatArray, float]:
-    """Cost of the series in each block, and of the statistics."""
-    comparison = whitener.comparison
-    n, bins = comparison.coefficients, comparison.grid.n
-    costs = np.zeros(BLOCKS)
-    number = np.minimum((np.arange(bins) * BLOCKS) // bins, BLOCKS - 1)
-    place = 0
-    for _ in comparison.channels:
-        full = np.zeros(bins)
-        full[:n] = vector[place : place + n]
-        costs += np.bincount(number, spectra.from_cosine(full) ** 2, BLOCKS)
-        place += n
-    return costs, float(np.sum(vector[place:] ** 2))
-
-
-@dataclass(frozen=True)
-class _Fold:
-    before: FloatArray
-    after: FloatArray
-    floor: float
-    size: int
-
-
-def _fold(
-    fitting: Whitener, scoring: Whitener, station: Station, terms: Sequence[Term],
-    rest: tuple[Simulated, Simulated],
-) -> _Fold:
-    fitted = fit(fitting, station, terms, rest[0], iterations=4, least=ROUGHLY)
-    corrected = scoring.comparison.simulate(planted(station, fitted.terms))
-    before = _block_costs(scoring, scoring.of(rest[1]))
-    after = _block_costs(scoring, scoring.of(corrected))
-    used = before[0] > 1e-9
-    size = scoring.of(rest[1]).size
-    return _Fold(
-        np.append(before[0][used], before[1]), np.append(after[0][used], after[1]),
-        fitted.cost, size,
-    )  # fmt: skip
-
-
-def _removed(folds: Sequence[_Fold], picks: Sequence[npt.NDArray[np.intp]] | None) -> float:
-    before = after = floor = 0.0
-    for k, fold in enumerate(folds):
-        if picks is None:
-            before += float(fold.before.sum())
-            after += float(fold.after.sum())
-        else:
-            scale = (fold.before.size - 1) / picks[k].size
-            before += float(fold.before[picks[k]].sum()) * scale + float(fold.before[-1])
-            after += float(fold.after[picks[k]].sum()) * scale + float(fold.after[-1])
-        floor += fold.floor
-    excess = before - min(floor, after)
-    return (before - after) / excess if excess > 0.0 else 0.0
+    curve_removed: float | None = None
+    transfer: float | None = None
+    coverage: float | None = None
+    wind_correlation: tuple[float, float] | None = None
 
 
 def prove(
@@ -147,39 +87,88 @@ def prove(
         placebo: The next-best explanation.
         seed: Of the block bootstrap.
     """
-    sides = [_masked_whitener(whitener, mask) for mask in block_masks(whitener.comparison)]
-    nothing = [side.comparison.simulate(station) for side in sides]
-    pairs = ((0, 1), (1, 0))
-    folds = [
-        _fold(sides[a], sides[b], station, terms, (nothing[a], nothing[b])) for a, b in pairs
-    ]
-    removed = _removed(folds, None)
+    even, odd = (side_of(whitener, station, m) for m in block_masks(whitener.comparison))
+    ways = ((even, odd), (odd, even))
+    folds = [fold_of(fitting, scoring, station, terms) for fitting, scoring in ways]
     rng = np.random.default_rng(seed)
     drawn = [
-        _removed(
-            folds,
-            [rng.integers(0, fold.before.size - 1, fold.before.size - 1) for fold in folds],
-        )
-        for _ in range(_DRAWS)
+        removed(folds, [rng.integers(0, f.before.size - 1, f.before.size - 1) for f in folds])
+        for _ in range(DRAWS)
     ]
     low, high = np.quantile(drawn, (0.025, 0.975))
-    placebo_removed = None
-    if placebo:
-        others = [
-            _fold(sides[a], sides[b], station, placebo, (nothing[a], nothing[b]))
-            for a, b in pairs
-        ]
-        # The placebo competes for the same excess.
-        for k, fold in enumerate(others):
-            others[k] = replace(fold, floor=folds[k].floor)
-        placebo_removed = _removed(others, None)
-    size = sum(fold.size for fold in folds)
+    rivals = [fold_of(*way, station, placebo) for way in ways] if placebo else []
+    parameters = sum(p.fitted for term in terms for p in term.effect.parameters)
+    smooth = [_curve(*way, parameters) for way in ways]
+    size = sum(fold.vector.size for fold in folds)
+    series = [f.vector[: _series_size(s)] for f, (_, s) in zip(folds, ways, strict=True)]
     return Proof(
         before=float(np.sqrt(sum(f.before.sum() for f in folds) / size)),
         after=float(np.sqrt(sum(f.after.sum() for f in folds) / size)),
         floor=float(np.sqrt(sum(f.floor for f in folds) / size)),
-        excess_removed=removed,
+        excess_removed=removed(folds),
         low=float(low),
         high=float(high),
-        placebo_removed=placebo_removed,
+        placebo_removed=removed(_instead(folds, rivals)) if rivals else None,
+        curve_removed=removed(_instead(folds, smooth)),
+        transfer=_transfer(whitener, station, terms),
+        coverage=float(np.mean(np.abs(np.concatenate(series)) < WITHIN)),
+        wind_correlation=(
+            max(_wind_correlation(s, s.before) for _, s in ways),
+            max(_wind_correlation(s, f.vector) for f, (_, s) in zip(folds, ways, strict=True)),
+        ),
     )
+
+
+def _instead(folds: Sequence[Fold], others: Sequence[Fold]) -> list[Fold]:
+    """Folds of something else, which competes for the same excess."""
+    return [replace(o, floor=f.floor) for f, o in zip(folds, others, strict=True)]
+
+
+def _series_size(side: Side) -> int:
+    comparison = side.whitener.comparison
+    return comparison.coefficients * len(comparison.channels)
+
+
+def _transfer(whitener: Whitener, station: Station, terms: Sequence[Term]) -> float | None:
+    """Share removed in the windier blocks by what was fitted to the calmer ones.
+
+    Of the excess there that the same effects remove when fitted to everything, with smooth curves
+    beside them: how much noise a half has depends on its wind.
+    """
+    masks = wind_masks(whitener.comparison)
+    if masks is None:
+        return None
+    calm, windy = (side_of(whitener, station, mask) for mask in masks)
+    everywhere = windy.whitener.of_station(planted(station, terms))
+    fold = fold_of(calm, windy, station, terms)
+    return removed([replace(fold, floor=least_left(windy, everywhere))])
+
+
+def _curve(fitting: Side, scoring: Side, parameters: int) -> Fold:
+    """A polynomial of the slow wind speed added to every channel, with so many coefficients."""
+    rows = [curves(side, max(parameters, 1) - 1, [speed_of(side)]) for side in (fitting, scoring)]
+    coefficients = np.linalg.lstsq(rows[0].T, fitting.before, rcond=None)[0]
+    left = fitting.before - coefficients @ rows[0]
+    return scored(scoring, scoring.before - coefficients @ rows[1], float(left @ left))
+
+
+def _wind_correlation(side: Side, vector: FloatArray) -> float:
+    """Largest correlation of a white residual with what the healthy instruments would show."""
+    comparison = side.whitener.comparison
+    n, bins = comparison.coefficients, comparison.grid.n
+    furthest = round(LONGEST_LAG / comparison.grid.dt)
+    largest = 0.0
+    for k, channel in enumerate(comparison.channels):
+        full = np.zeros(bins)
+        full[:n] = vector[k * n : (k + 1) * n]
+        residual = spectra.from_cosine(full)
+        full = np.zeros(bins)
+        full[1:n] = side.healthy.cosine[channel.name][1:n]
+        wind = spectra.from_cosine(full)
+        scale = float(np.linalg.norm(residual) * np.linalg.norm(wind))
+        if scale > 0.0:
+            products = [
+                abs(float(np.roll(wind, lag) @ residual)) for lag in range(-furthest, furthest + 1)
+            ]
+            largest = max(largest, max(products) / scale)
+    return largest

@@ -214,7 +214,7 @@ class Searcher:
         groups = group_templates(self.probes.templates)
         out: list[list[Term]] = []
         worth = max(LEAST_GAIN, LEAST_SHARE * scores[0].gain) if scores else 0.0
-        for score in [s for s in scores[:number] if s.gain > worth]:
+        for score in [s for s in scores[:number] if s.gain > worth and self._may_be(s)]:
             effect = self.effects[score.effect]
             start = starting_values(score)
             starts = [Term(effect, score.instrument, start)]
@@ -250,6 +250,12 @@ class Searcher:
             elif blind or key[0] not in BLIND_EFFECTS:
                 out.append(list(guesses))
         return out
+
+    def _may_be(self, score: Score) -> bool:
+        """Whether an effect whose signals tell that it is there has been told by them."""
+        return not self.effects[score.effect].legible or (
+            (score.effect, score.instrument) in self.guesses
+        )
 
     def best_fit(
         self, whitener: Whitener, current: Fit | None, starts: Sequence[Term],

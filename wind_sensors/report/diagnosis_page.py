@@ -10,6 +10,7 @@ import numpy as np
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.findings import Estimate, Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
 
@@ -137,12 +138,6 @@ def _proof(finding: Finding) -> str:
     if proof is None:
         return ""
     share = float(np.clip(proof.excess_removed, 0.0, 1.0))
-    placebo = ""
-    if proof.placebo_removed is not None:
-        placebo = (
-            f"<p>The next-best explanation removes {100.0 * proof.placebo_removed:.0f} % on the "
-            "same blocks.</p>"
-        )
     return (
         "<section><h2>The proof, on data that were not fitted</h2>"
         "<p>Every other block of the record was fitted, the blocks between were scored, and the "
@@ -151,8 +146,33 @@ def _proof(finding: Finding) -> str:
         f"<p><b>{100.0 * proof.excess_removed:.0f} %</b> of the excess misfit disappears "
         f"(95 % interval {100.0 * proof.low:.0f} to {100.0 * proof.high:.0f} %). Whitened misfit "
         f"{proof.before:.3f} before, {proof.after:.3f} after; {proof.floor:.3f} on the fitted "
-        f"blocks; 1 is a healthy day.</p>{placebo}</section>"
+        f"blocks; 1 is a healthy day.</p>{_checks(proof)}</section>"
     )
+
+
+def _checks(proof: Proof) -> str:
+    rows = [
+        ("the next-best explanation removes", proof.placebo_removed, "%"),
+        ("smooth curves over the wind speed with as many coefficients remove",
+         proof.curve_removed, "%"),
+        ("fitted to the calmer half of the blocks, it removes in the windier half",
+         proof.transfer, "%"),
+        ("residuals within the band that holds 95 % on a healthy day", proof.coverage, "%"),
+    ]  # fmt: skip
+    cells = [
+        (text, f"{100.0 * value:.0f} {unit}") for text, value, unit in rows if value is not None
+    ]
+    if proof.wind_correlation is not None:
+        before, after = proof.wind_correlation
+        cells.append(
+            ("largest correlation of the residual with the wind, within 10 s",
+             f"{before:.2f} before, {after:.2f} after")
+        )  # fmt: skip
+    if not cells:
+        return ""
+    lines = "".join(f"<tr><td>{escape(text)}</td><td>{value}</td></tr>" for text, value in cells)
+    head = "<tr><th>on the same blocks</th><th></th></tr>"
+    return f"<div class='scroll'><table>{head}{lines}</table></div>"
 
 
 def _next(diagnosis: Diagnosis) -> str:

@@ -24,6 +24,7 @@ ERRATIC_INTERVAL = 120_000_000
 """Readings further apart [ns] are not judged by their steps."""
 
 _ERRATIC_REACH = 150_000_000
+_ERRATIC_PAUSE = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def erratic(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
     """Readings that jump about as an open potentiometer's do, and those close to them; shape (n,).
 
     A number drawn by chance may lie near the truth, so that readings within 0.15 s of a jump go
-    with it.
+    with it, and those between two jumps that are less than a second away on either side.
 
     Args:
         angles: Readings.
@@ -71,8 +72,12 @@ def erratic(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
     following = np.searchsorted(at, time)
     before = time - at[np.maximum(following - 1, 0)]
     after = at[np.minimum(following, at.size - 1)] - time
-    nearest = np.minimum(np.abs(before), np.abs(after))
-    return np.asarray(nearest <= _ERRATIC_REACH, dtype=np.bool_)
+    before, after = np.abs(before), np.abs(after)
+    close = np.minimum(before, after) <= _ERRATIC_REACH
+    between = (following > 0) & (following < at.size) & (
+        np.maximum(before, after) <= _ERRATIC_PAUSE
+    )
+    return np.asarray(close | between, dtype=np.bool_)
 
 
 @dataclass(frozen=True)
