@@ -43,6 +43,11 @@ SIZE = 5.0
 SEPARATION = 2.0
 """Of the reference from the instruments [m]."""
 
+SWELL, TURN = 0.35, 1.2
+"""Slow swing of the speed [relative] and of the direction [rad]: where the wind hardly changes, or
+speed and direction change together, effects of other forms are the same, and nothing can tell that
+the true one is missing."""
+
 PROCESSES = 2
 
 
@@ -81,9 +86,10 @@ def recorded(station: Station, seed: int, made_by: Station | None = None) -> Rec
         direction=float(rng.uniform(-np.pi, np.pi)),
         standard_deviations=(0.14 * speed, 0.11 * speed, 0.07 * speed),
         integral_lengths=(120.0, 60.0, 20.0),
-        slow_amplitude=0.2 * speed,
+        slow_amplitude=SWELL * speed,
         slow_period=700.0,
-        turn_amplitude=0.5,
+        turn_amplitude=TURN,
+        turn_period=430.0,
         seed=seed,
     )
     moving = boat(seed=seed) if station.platform is not None else None

@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.naming import is_its_moment
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.signatures import LARGER
+from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
 
 SLOW = Station.model_validate(
@@ -113,6 +114,21 @@ def test_coarse_steps_are_not_tried_on_readings_that_have_none() -> None:
     assert ("vane_friction", "vane") in tried
     assert ("quantisation", "vane") in {(s.effect, s.instrument) for s in scores}
     assert ("quantisation", "vane") not in tried
+
+
+def test_what_the_readings_tell_is_taken_first_and_kept() -> None:
+    effects = catalogue()
+    station = with_effect(STATION, effects["vane_friction"], "vane", {"friction_speed": 2.5})
+    coarse = {"step": 6.0, "origin": 1.5}
+    station = with_effect(station, effects["quantisation"], "vane", coarse)
+    found = diagnose(recorded(station, 73), baseline())
+    assert found.verdict == "named"
+    first, second = found.findings
+    assert first.term.key == ("quantisation", "vane")
+    assert second.term.key == ("vane_friction", "vane")
+    assert first.term.values["step"] == pytest.approx(6.0, abs=1e-3)
+    step = first.parameters["step"]
+    assert step.low < 6.0 < step.high < 6.6
 
 
 @pytest.mark.parametrize(("interval", "same"), [((158.0, 204.0), True), ((40.0, 90.0), False)])

@@ -117,6 +117,15 @@ def test_slow_mean_and_turn() -> None:
     assert np.allclose(np.arctan2(velocity[:, 1], velocity[:, 0]), 0.4 + 0.2 * slow, rtol=1e-12)
 
 
+def test_the_turn_may_have_a_period_of_its_own() -> None:
+    calm = TurbulenceSpec(
+        mean_speed=6.0, slow_amplitude=2.0, slow_period=100.0, turn_amplitude=0.3, turn_period=37.0
+    )
+    velocity = synthesize(calm, 1.0, 100)
+    turned = 0.3 * np.sin(2.0 * np.pi * np.arange(100) / 37.0)
+    assert np.allclose(np.arctan2(velocity[:, 1], velocity[:, 0]), turned, atol=1e-12)
+
+
 def test_small_scales_of_the_surface_layer_are_isotropic() -> None:
     """The three inertial subranges have one dissipation, that of the surface layer."""
     spec = surface_layer_spec(8.0, 12.0, 0.05)

@@ -74,6 +74,9 @@ EVENT = 3
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
 
+SMALLEST_TOLD = 0.4
+"""The same of what the signals tell without a fit: left out, it would be a riddle."""
+
 SMALLEST_BESIDE = 1.8
 """The same beside another effect on the same signals, whose form a small one may make good."""
 
@@ -297,9 +300,14 @@ def plausible(candidate: Fit) -> bool:
     return is_plausible(candidate.terms[-1])
 
 
+def large_enough(term: Term) -> bool:
+    """Whether a term matters."""
+    return term.relative_size >= (SMALLEST_TOLD if term.is_told else SMALLEST_SIZE)
+
+
 def is_plausible(term: Term) -> bool:
     """Whether one term is."""
-    if term.relative_size < SMALLEST_SIZE:
+    if not large_enough(term):
         return False
     for parameter in term.effect.parameters:
         if parameter.healthy is None or parameter.minimum <= 0.0 or not parameter.fitted:

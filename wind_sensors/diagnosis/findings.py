@@ -90,6 +90,8 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             value = term.values[parameter.name]
             departure = 0.0 if parameter.healthy is None else value - parameter.healthy
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
+            if parameter.told and parameter.fitted:
+                noise = 0.0
             # What an inexact form adds to one component of an effect, it takes from others.
             size = max(abs(departure), term.relative_size * parameter.minimum)
             error = INTERVAL_FACTOR * float(np.hypot(noise, term.effect.form_error * size))

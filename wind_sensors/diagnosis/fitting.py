@@ -72,6 +72,11 @@ class Term:
         """Effect and instrument."""
         return self.effect.name, self.instrument
 
+    @property
+    def is_told(self) -> bool:
+        """Whether the signals tell everything about it, and it holds all the time."""
+        return self.interval == ALWAYS and all(p.told for p in self.effect.parameters)
+
 
 def planted(station: Station, terms: Sequence[Term]) -> Station:
     """The station with all terms.
@@ -396,7 +401,7 @@ def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> Flo
 
 
 def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
-    """Bounds of all parameters; those that are not to be fitted have no room."""
+    """Bounds of all parameters; those that are told or not to be fitted have no room."""
     parameters = [p for _, p in _parameters(terms)]
     low = np.array([p.low for p in parameters])
     high = np.array([p.high for p in parameters])
@@ -406,6 +411,6 @@ def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, Floa
         tied = parameter.free is not None and not parameter.free(drive)
         if (tied or parameter.swing > swing) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
-        elif not parameter.fitted:
+        elif parameter.told or not parameter.fitted:
             low[k] = high[k] = values_of(terms)[k]
     return low, high

@@ -9,12 +9,12 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     ACCEPTED_FURTHER_GAIN,
     ACCEPTED_GAIN,
-    SMALLEST_SIZE,
     Alternative,
     Judged,
     evidence,
     inexact,
     judged,
+    large_enough,
     may_join,
     no_terms,
     plausible,
@@ -47,7 +47,7 @@ def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         ]
         best = min(without, key=total)
         if total(best) - total(current) > ACCEPTED_GAIN and all(
-            t.relative_size >= SMALLEST_SIZE for t in current.terms
+            large_enough(t) for t in current.terms
         ):
             break
         current = best
@@ -62,12 +62,16 @@ def merged(
 ) -> Fit:
     """One effect in the place of several, where it does nearly as well.
 
+    None takes the place of what the signals tell.
+
     Args:
         searcher: The search.
         whitener: The null.
         current: The explanation by several effects.
         singles: Single effects that did well in the beginning.
     """
+    if any(term.is_told for term in current.terms):
+        return current
     instruments = [t.instrument for t in current.terms]
     crowded = {name for name in instruments if instruments.count(name) > 1}
     crowded |= {STATION, PLATFORM}
@@ -104,6 +108,8 @@ def swapped(
     losers: list[Judged] = []
     leader = Judged(current, whitener, evidence(current, whitener))
     for k in range(len(current.terms)):
+        if current.terms[k].is_told:
+            continue
         part = without_term(current, k)
         others = part.terms
         without = fit(

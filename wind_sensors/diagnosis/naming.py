@@ -137,8 +137,8 @@ def _leader(
 ) -> Judged | None:
     """The explanation that brings most of those that bring enough; None: there is none.
 
-    Only those compete that are not clearly behind in likelihood; of those that bring the same the
-    likeliest leads.
+    What the signals tell by themselves comes first. Of the others only those compete that are not
+    clearly behind in likelihood; of those that bring the same the likeliest leads.
 
     Args:
         searcher: The search.
@@ -149,7 +149,8 @@ def _leader(
     so_far = evidence(current, whitener)
     enough: list[tuple[float, Judged]] = []
     likeliest = np.inf
-    for one in ranked:
+    for one in sorted(ranked, key=lambda r: not r.fit.terms[-1].is_told):
+        told = one.fit.terms[-1].is_told
         if one.evidence > likeliest + CLEARLY_BETTER:
             break
         brings = _brings(searcher, one, current, so_far)
@@ -159,6 +160,8 @@ def _leader(
             passing_gain(newest),
             _inexactness(searcher, whitener, current, newest),
         )
+        if brings >= least and told:
+            return one
         if brings >= least:
             enough.append((brings, one))
             likeliest = min(likeliest, one.evidence)
@@ -224,6 +227,8 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: 
     if further.instrument not in (reached | {STATION, PLATFORM}):
         return 0.0
     if not current.terms:
+        return 0.0
+    if further.is_told:
         return 0.0
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf

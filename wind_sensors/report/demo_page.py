@@ -85,8 +85,10 @@ def demo_page(results: DemoResults, run: Circumstances) -> str:
             "turns. The <span class='raw'>naive reading</span> applies the calibration and "
             "nothing else. The <span class='corrected'>corrected wind</span> uses the time of "
             "every single pulse, the motion of both instruments and the statistics of "
-            "turbulence; the band should hold the truth nine times out of ten, and over the "
-            f"hour it does in {100.0 * results.coverage:.1f} % of cases.",
+            "turbulence. The band is to hold the truth nine times out of ten with real "
+            "instruments, and allows for what their equations leave out. These simulated ones "
+            "follow the equations, so that over the hour it holds the truth in "
+            f"{100.0 * results.coverage:.1f} % of cases.",
             _figure(gust, results, 5.2, 5.6),
         ),
         _section(

@@ -130,9 +130,8 @@ class TurbulentWind:
 
     def _with_mean(self, time: FloatArray, fluctuation: FloatArray) -> FloatArray:
         spec = self._spec
-        slow = np.sin(2.0 * np.pi * time / spec.slow_period + spec.slow_phase)
-        along = spec.mean_speed + spec.slow_amplitude * slow + fluctuation[:, 0]
-        heading = spec.direction + spec.turn_amplitude * slow
+        speed, heading = spec.mean_wind(time)
+        along = speed + fluctuation[:, 0]
         cosine, sine = np.cos(heading), np.sin(heading)
         return np.stack(
             (

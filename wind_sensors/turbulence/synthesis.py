@@ -39,7 +39,8 @@ class TurbulenceSpec:
         slow_amplitude: Amplitude of a slow sinusoidal change of the mean speed.
         slow_period: Its period [s].
         slow_phase: Its phase at t = 0.
-        turn_amplitude: Amplitude of a slow sinusoidal turn of the mean direction, same period.
+        turn_amplitude: Amplitude of a slow sinusoidal turn of the mean direction.
+        turn_period: Its period [s]; None: that of the speed.
         seed: Any integer not negative.
     """
 
@@ -53,7 +54,16 @@ class TurbulenceSpec:
     slow_period: float = 600.0
     slow_phase: float = 0.0
     turn_amplitude: float = 0.0
+    turn_period: float | None = None
     seed: int = 0
+
+    def mean_wind(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Slowly changing mean speed [m/s] and heading [rad] at some times [s], shape (n,) each."""
+        slow = np.sin(2.0 * math.pi * time / self.slow_period + self.slow_phase)
+        period = self.slow_period if self.turn_period is None else self.turn_period
+        turned = np.sin(2.0 * math.pi * time / period + self.slow_phase)
+        speed = self.mean_speed + self.slow_amplitude * slow
+        return speed, self.direction + self.turn_amplitude * turned
 
 
 def isotropic_spec(
@@ -169,15 +179,13 @@ class TurbulenceStream:
         """Wind velocities of samples start..start + count - 1, east, north, up [m/s]."""
         fluctuation = self.fluctuations(start, count)
         time = (start + np.arange(count)) / self.sample_rate
-        spec = self.spec
-        slow = np.sin(2.0 * math.pi * time / spec.slow_period + spec.slow_phase)
-        along = spec.mean_speed + spec.slow_amplitude * slow + fluctuation[:, 0]
-        heading = spec.direction + spec.turn_amplitude * slow
+        speed, heading = self.spec.mean_wind(time)
+        along = speed + fluctuation[:, 0]
         cosine, sine = np.cos(heading), np.sin(heading)
         out = np.empty((count, 3))
         out[:, 0] = along * cosine - fluctuation[:, 1] * sine
         out[:, 1] = along * sine + fluctuation[:, 1] * cosine
-        out[:, 2] = spec.mean_vertical + fluctuation[:, 2]
+        out[:, 2] = self.spec.mean_vertical + fluctuation[:, 2]
         return out
 
     def fluctuations(self, start: int, count: int) -> FloatArray:

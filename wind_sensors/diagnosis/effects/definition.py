@@ -38,6 +38,7 @@ class Parameter:
             needs; with less it keeps its healthy value.
         fitted: A parameter that is not keeps the value that it starts with (one form of an effect
             or another).
+        told: The signals tell it better than a fit can, which keeps it.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Parameter:
     swing: float = 0.0
     free: Callable[[Drive], bool] | None = None
     fitted: bool = True
+    told: bool = False
 
     @property
     def difference(self) -> float:

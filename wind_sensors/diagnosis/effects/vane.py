@@ -263,8 +263,8 @@ QUANTISATION = Effect(
     region="all, in the histogram of the readings",
     standing=0.0,
     parameters=(
-        Parameter("step", "deg", 0.0, 95.0, minimum=2.0, step=0.5, starts=(5.0, 11.25, 22.5)),
-        Parameter("origin", "deg", -360.0, 360.0, healthy=None, fitted=False),
+        Parameter("step", "deg", 0.0, 95.0, minimum=2.0, step=0.5, told=True),
+        Parameter("origin", "deg", -360.0, 360.0, healthy=None, fitted=False, told=True),
     ),
     applies=_is_vane,
     update=_quantisation,
