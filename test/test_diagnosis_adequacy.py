@@ -10,11 +10,11 @@ from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import borne_out, made_up
+from wind_sensors.diagnosis.decision import borne_out, determined, made_up
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
-from wind_sensors.diagnosis.findings import Finding
+from wind_sensors.diagnosis.findings import Estimate, Finding
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
@@ -197,6 +197,15 @@ def test_what_acts_seldom_cannot_be_asked_of_every_block(
         proof=replace(found.proof, excess_removed=removed),
     )
     assert borne_out((found,)) is borne
+
+
+@pytest.mark.parametrize(("low", "high", "known"), [(0.1, 0.5, True), (-0.5, 0.9, False)])
+def test_a_name_needs_a_size_that_is_not_nought(low: float, high: float, known: bool) -> None:
+    offset = {"offset": Estimate(0.3, low, high, "m/s")}
+    assert determined((replace(_finding(*OFFSET, 0.9, 0.002), parameters=offset),)) is known
+    # What is there or is not has no size to determine.
+    swapped = _finding("sensor_swap", "vane", 0.9, 0.002)
+    assert determined((swapped,))
 
 
 def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:

@@ -102,6 +102,15 @@ def test_readings_that_repeat_tell_the_step_and_since_when() -> None:
     assert ("quantisation", "vane") not in healthy
 
 
+def test_few_fine_readings_hide_no_coarse_ones() -> None:
+    """A coarse part so long that most readings repeat, and the fine ones beside it do not."""
+    effect = catalogue()["quantisation"]
+    station = with_effect(STATION, effect, "vane", {"step": 8.0, "origin": 0.0}, (60.0, None))
+    (term,) = guesses_of(prepare(recorded(station, 76)), STATION)[("quantisation", "vane")]
+    assert term.values["step"] == pytest.approx(8.0, abs=0.01)
+    assert term.interval[0] == pytest.approx(60.0, abs=3.0)
+
+
 def test_coarse_steps_are_not_tried_on_readings_that_have_none() -> None:
     station = with_effect(STATION, catalogue()["vane_friction"], "vane", {"friction_speed": 3.0})
     comparison = prepare(recorded(station, 72))

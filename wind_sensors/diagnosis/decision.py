@@ -201,6 +201,22 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     return seldom and stands_out(findings) and proof.excess_removed >= rival
 
 
+def determined(findings: tuple[Finding, ...]) -> bool:
+    """Whether the data tell, of every effect named, at least one size that is not nought."""
+    return all(_has_a_size(f) for f in findings if f.proof is not None)
+
+
+def _has_a_size(finding: Finding) -> bool:
+    effect = finding.term.effect
+    graded = [
+        p for p in effect.parameters if p.fitted and p.healthy is not None and p.minimum > 0.0
+    ]
+    if effect.size is not None or not graded:
+        return True
+    known = [(p.healthy or 0.0, finding.parameters.get(p.name)) for p in graded]
+    return any(e is None or not e.low <= healthy <= e.high for healthy, e in known)
+
+
 def stands_out(findings: tuple[Finding, ...]) -> bool:
     """Whether the data show a mismatch where one of the findings acts."""
     return any(f.p < REMAINDER_P for f in findings)

@@ -74,8 +74,8 @@ class Term:
 
     @property
     def is_told(self) -> bool:
-        """Whether the signals tell everything about it, and it holds all the time."""
-        return self.interval == ALWAYS and all(p.told for p in self.effect.parameters)
+        """Whether the signals tell everything about it."""
+        return self.effect.legible and all(p.told for p in self.effect.parameters)
 
 
 def planted(station: Station, terms: Sequence[Term]) -> Station:

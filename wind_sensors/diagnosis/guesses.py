@@ -306,7 +306,7 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
             turns = np.exp(2j * np.pi * values / step)
             origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
             out.append(_term("quantisation", vane, step=step, origin=origin))
-    else:
+    if not out:
         out.extend(_coarse_for_a_while(comparison, vane))
     common = values[counts > max(0.004 * readings.size, 20)]
     hole = _hole(degrees)

@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.decision import (
     REMAINDER_P,
     Verdict,
     borne_out,
+    determined,
     is_noisy,
     made_up,
     remainder_of,
@@ -191,7 +192,8 @@ def diagnose(
     if refuted:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
         verdict, findings = ("unknown" if stands_out(findings) else "none"), ()
-    if findings and (made_up(findings, comparison) or undo_each_other(naming, baseline.station)):
+    made = made_up(findings, comparison) or undo_each_other(naming, baseline.station)
+    if findings and (made or not determined(findings)):
         verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
