@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.decision import undo_each_other
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Naming
+from wind_sensors.diagnosis.explanation import Naming, overlap
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
@@ -150,6 +150,22 @@ def test_what_passes_while_another_effect_shows_is_its_form(
     current = fit(null, SLOW, [turned], searcher.bank.without, iterations=1)
     further = Term(catalogue()["vane_eccentricity"], "vane", {"sine": 5.0, "cosine": 0.0}, interval)
     assert is_its_moment(searcher, current, further) is same
+
+
+def test_the_form_of_what_acts_for_a_while_says_nothing_of_the_rest() -> None:
+    searcher = searched(SLOW)
+    null = searcher.whitener(searcher.bank.without)
+    effects = catalogue()
+    turned = Term(effects["vane_offset"], "vane", {"offset": 20.0}, (100.0, 200.0))
+    bent = Term(effects["vane_eccentricity"], "vane", {"sine": 4.0, "cosine": 0.0})
+    shares = []
+    for first in (turned, replace(turned, interval=ALWAYS)):
+        one = fit(null, SLOW, [first], searcher.bank.without, iterations=0)
+        two = fit(null, SLOW, [first, bent], searcher.bank.without, iterations=0)
+        shares.append(overlap(searcher, one, two))
+    # A quarter of the record, with the turns that the wind happens to make in it.
+    assert 0.1 < shares[0] < 0.6
+    assert shares[1] > 0.99
 
 
 def test_exchanged_wires_are_there_or_not() -> None:

@@ -109,6 +109,11 @@ def oracle_lines(found: Sequence[Share]) -> list[str]:
             f"- {title}: {middle}at least {ENOUGH:g} of what the true model removes in {enough} of "
             f"{len(some)} ({100 * low:.0f} to {100 * high:.0f} %)"
         )
+    low, high = clopper_pearson(len(exact), len(found))
+    lines.append(
+        f"- of the recordings in which the true model is named where it has no rival: exact in "
+        f"{len(exact)} of {len(found)} ({100 * low:.0f} to {100 * high:.0f} %)"
+    )
     lines += ["", "| recording | concealed | said | removed | by the true model | share |"]
     lines += ["|---|---|---|---|---|---|"]
     lines += [

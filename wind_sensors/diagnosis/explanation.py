@@ -55,6 +55,9 @@ FURTHER_EXACT_SHARE = 0.05
 LARGEST_EXACT_INEXACTNESS = 150.0
 """The same beside effects whose form is certain."""
 
+TRACE = 0.01
+"""An effect acts where it changes a signal by more than this share of its largest change."""
+
 PASSING_BESIDE = 3.0
 """So many times more, if it begins or ends inside the record: effects grow and fade themselves."""
 
@@ -129,6 +132,36 @@ def inexact(current: Fit, nothing: float) -> float:
         share, largest = FURTHER_SHARE, LARGEST_INEXACTNESS
     most = max(largest, LEAST_SHARE_BESIDE * gained)
     return min(max(share * gained, ACCEPTED_FURTHER_GAIN), most)
+
+
+def overlap(searcher: Searcher, fewer: Fit, more: Fit) -> float:
+    """Share of what further effects change in the parts of the record where the others act.
+
+    A wake of another form slows the wind in another way behind the mast, not on the other side.
+
+    Args:
+        searcher: The search.
+        fewer: An explanation.
+        more: One with further effects.
+    """
+    comparison = searcher.comparison
+    known = {term.key for term in fewer.terms}
+    reached = {
+        name
+        for term in more.terms
+        if term.key not in known
+        for name in comparison.affected(searcher.station, term.instrument)
+    }
+    there = everywhere = 0.0
+    for channel in comparison.channels:
+        if channel.instrument not in reached:
+            continue
+        name = channel.name
+        acts = np.abs(fewer.simulated.series[name] - searcher.bank.without.series[name])
+        changed = (more.simulated.series[name] - fewer.simulated.series[name]) ** 2
+        there += float(np.sum(changed[acts > TRACE * float(acts.max(initial=0.0))]))
+        everywhere += float(np.sum(changed))
+    return there / everywhere if everywhere > 0.0 else 1.0
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.explanation import (
     large_enough,
     may_join,
     no_terms,
+    overlap,
     plausible,
     total,
 )
@@ -95,7 +96,8 @@ def merged(
     if not ranked:
         return current
     alone = ranked[0]
-    margin = ACCEPTED_FURTHER_GAIN + inexact(alone.fit, nothing.cost)
+    own = inexact(alone.fit, nothing.cost) * overlap(searcher, alone.fit, current)
+    margin = ACCEPTED_FURTHER_GAIN + own
     if alone.evidence < evidence(current, whitener) + margin:
         return alone.fit
     return current

@@ -23,6 +23,7 @@ from wind_sensors.diagnosis.explanation import (
     may_join,
     needed_gain,
     no_terms,
+    overlap,
     passing_gain,
     plausible,
     seen_in,
@@ -158,7 +159,7 @@ def _leader(
         least = max(
             needed_gain(current, newest, searcher.baseline),
             passing_gain(newest),
-            _inexactness(searcher, whitener, current, newest),
+            _inexactness(searcher, whitener, current, one.fit),
         )
         if brings >= least and told:
             return one
@@ -217,8 +218,9 @@ def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
     return list(found.values())
 
 
-def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: Term) -> float:
+def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> float:
     """What a further term must bring if it acts on signals that the terms so far change."""
+    further = longer.terms[-1]
     reached = {
         name
         for term in current.terms
@@ -233,7 +235,7 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, further: 
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf
     nothing = whitener.of(searcher.bank.without)
-    own = inexact(current, float(nothing @ nothing))
+    own = inexact(current, float(nothing @ nothing)) * overlap(searcher, current, longer)
     passing = further.interval != ALWAYS and not further.effect.legible
     return PASSING_BESIDE * own if passing else own
 
