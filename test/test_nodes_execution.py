@@ -84,3 +84,40 @@ def test_mistakes_end_with_status_two_and_a_sentence(
     assert process.returncode == 2
     assert told in errors
     assert "Traceback" not in errors
+
+
+STOPPED_WITHIN_A_DESTRUCTOR = """
+import os, signal
+from wind_sensors.nodes.execution import run
+
+class Held:
+    def __init__(self, answer):
+        self.answer = answer
+
+    def __del__(self):
+        self.answer()
+
+def build():
+    Held(lambda: os.kill(os.getpid(), signal.SIGINT))
+    Held(lambda: 1 / 0)
+    return []
+
+raise SystemExit(run(build, []))
+"""
+
+
+def test_a_stop_within_a_destructor_is_silent_and_other_mistakes_there_are_not(
+    tmp_path: Path,
+) -> None:
+    environment = os.environ | {
+        "ROS_LOG_DIR": str(tmp_path),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DOMAIN_ID": str(100 + os.getpid() % 100),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", STOPPED_WITHIN_A_DESTRUCTOR],
+        env=environment, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "_Stopped" not in done.stderr
+    assert "ZeroDivisionError" in done.stderr

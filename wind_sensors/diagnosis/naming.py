@@ -226,11 +226,8 @@ def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: F
         for term in current.terms
         for name in searcher.comparison.affected(searcher.station, term.instrument)
     }
-    if further.instrument not in (reached | {STATION, PLATFORM}):
-        return 0.0
-    if not current.terms:
-        return 0.0
-    if further.is_told:
+    beside = further.instrument in (reached | {STATION, PLATFORM})
+    if not current.terms or not beside or further.is_told:
         return 0.0
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf

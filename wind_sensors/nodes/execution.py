@@ -47,13 +47,26 @@ class _StopSignals:
     def __init__(self) -> None:
         self.phase = _Phase.LOADING
         self._installed = False
+        self._usual = sys.unraisablehook
 
     def install(self) -> None:
         """Answer SIGINT and SIGTERM; to be called from the main thread, before rclpy.init."""
         if not self._installed:
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, self._answer)
+            if sys.unraisablehook is not _unraisable:
+                self._usual = sys.unraisablehook
+                sys.unraisablehook = _unraisable
             self._installed = True
+
+    def report_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """What an exception leads to that nobody can catch: a stop signal, to nothing.
+
+        It may arrive within a destructor, where Python drops what is raised; rclpy has shut its
+        context down then, which ends the run as soon as the nodes are built.
+        """
+        if not issubclass(unraisable.exc_type, _Stopped):
+            self._usual(unraisable)
 
     def uninstall(self, *, ignore: bool) -> None:
         """Hand SIGINT and SIGTERM back to Python's defaults, or to nobody.
@@ -78,6 +91,10 @@ class _StopSignals:
 
 
 _stop_signals = _StopSignals()
+
+
+def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
+    _stop_signals.report_unraisable(unraisable)
 
 
 def execute(target: str, arguments: Sequence[str] | None = None) -> int:
