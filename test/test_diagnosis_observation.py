@@ -16,7 +16,6 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import (
     Grid,
     rate_series,
-    repeat_statistics,
     stillness_statistics,
 )
 from wind_sensors.diagnosis.verdict import diagnose
@@ -78,18 +77,6 @@ def test_no_chance_reading_survives_a_long_stay_in_a_gap() -> None:
     loose[600:2400] = True
     angle[loose] = rng.uniform(-np.pi, np.pi, loose.sum())
     assert erratic(_readings(angle))[loose].all()
-
-
-def test_readings_that_come_again_are_counted() -> None:
-    rng = np.random.default_rng(7)
-    angle = 0.4 * rng.standard_normal(4000)
-    coarse = np.radians(5.0) * np.round(angle / np.radians(5.0))
-    half = np.where(np.arange(4000) < 2000, coarse, angle)
-    grid = Grid(0, 0.2, 1000)
-    for readings, share in ((angle, 0.0), (half, 0.5), (coarse, 1.0)):
-        assert repeat_statistics(_readings(readings), grid)[0] == pytest.approx(share, abs=0.02)
-    first_half = (np.arange(1000) < 500).astype(float)
-    assert repeat_statistics(_readings(half), grid, first_half)[0] > 0.98
 
 
 def test_sparse_readings_are_not_judged_by_their_steps() -> None:

@@ -21,7 +21,6 @@ from wind_sensors.diagnosis.naming import is_its_moment
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.signatures import LARGER
-from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
 
 SLOW = Station.model_validate(
@@ -125,18 +124,13 @@ def test_coarse_steps_are_not_tried_on_readings_that_have_none() -> None:
     assert ("quantisation", "vane") not in tried
 
 
-def test_what_the_readings_tell_is_taken_first_and_kept() -> None:
-    effects = catalogue()
-    station = with_effect(STATION, effects["vane_friction"], "vane", {"friction_speed": 2.5})
-    coarse = {"step": 6.0, "origin": 1.5}
-    station = with_effect(station, effects["quantisation"], "vane", coarse)
-    found = diagnose(recorded(station, 73), baseline())
+def test_the_step_that_readings_tell_is_kept() -> None:
+    found = diagnosed("quantisation", "vane", seed=73, step=6.0, origin=1.5)
     assert found.verdict == "named"
-    first, second = found.findings
-    assert first.term.key == ("quantisation", "vane")
-    assert second.term.key == ("vane_friction", "vane")
-    assert first.term.values["step"] == pytest.approx(6.0, abs=1e-3)
-    step = first.parameters["step"]
+    (one,) = found.findings
+    assert one.term.key == ("quantisation", "vane")
+    assert one.term.values["step"] == pytest.approx(6.0, abs=1e-3)
+    step = one.parameters["step"]
     assert step.low < 6.0 < step.high < 6.6
 
 

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.observation import (
     ERRATIC,
     NORMALISED_BANDS,
-    REPEATS,
     STILLNESS,
     Channel,
 )
@@ -39,7 +38,6 @@ _SPECTRUM_PRIOR = 0.22
 _INTERVAL_PRIOR = np.array([0.002, 0.002, 0.003, 0.001, 0.0007, 0.001])
 _STILLNESS_PRIOR = 0.12
 _ERRATIC_PRIOR = 0.003
-_REPEATS_PRIOR = 0.05
 
 
 def statistics_prior(channel: Channel) -> FloatArray:
@@ -47,8 +45,7 @@ def statistics_prior(channel: Channel) -> FloatArray:
     bands = np.full(_BANDS, _SPECTRUM_PRIOR)
     if channel.kind == "vane_angle":
         still = np.full(STILLNESS, _STILLNESS_PRIOR)
-        erratic, repeats = np.full(ERRATIC, _ERRATIC_PRIOR), np.full(REPEATS, _REPEATS_PRIOR)
-        return np.concatenate((bands, still, erratic, repeats))
+        return np.concatenate((bands, still, np.full(ERRATIC, _ERRATIC_PRIOR)))
     return np.concatenate((bands, _INTERVAL_PRIOR))
 
 

@@ -29,7 +29,6 @@ from wind_sensors.diagnosis.observation import (
     erratic_statistics,
     interval_statistics,
     rate_series,
-    repeat_statistics,
     stillness_statistics,
 )
 from wind_sensors.errors import UserError
@@ -270,7 +269,6 @@ class Comparison:
                             self.mask,
                         ),
                         erratic_statistics(readings, self.direction, self.grid, self.mask),
-                        repeat_statistics(readings, self.grid, self.mask),
                     )
                 )
             series[channel.name] = values

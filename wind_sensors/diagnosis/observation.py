@@ -232,32 +232,6 @@ def erratic_statistics(
     )
 
 
-REPEATS = 1
-"""Number of statistics of readings that come again."""
-
-OFTEN = 8
-"""A value that comes more often than this is one of few; seldomer, chance will do."""
-
-
-def repeat_statistics(
-    angles: Angles, grid: Grid, mask: FloatArray | None = None
-) -> FloatArray:
-    """Share of a vane's readings whose value comes again and again, to 0.0001 degrees.
-
-    Args:
-        angles: Readings.
-        grid: Bins.
-        mask: Weight of the bins; those below a half do not count.
-    """
-    place = np.floor(grid.seconds(angles.time) / grid.dt).astype(np.intp)
-    inside = (place >= 0) & (place < grid.n) & np.isfinite(angles.angle)
-    if mask is not None:
-        inside[inside] = mask[place[inside]] > 0.5
-    _, counts = np.unique(np.round(np.degrees(angles.angle[inside]), 4), return_counts=True)
-    share = float(np.sum(counts[counts > OFTEN])) / max(int(np.sum(counts)), 1)
-    return np.array([share])
-
-
 LEAST_TURNS = 150
 """Bins with fewer turns say nothing about a vane's stillness."""
 
