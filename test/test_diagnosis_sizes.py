@@ -125,13 +125,11 @@ def test_coarse_steps_are_not_tried_on_readings_that_have_none() -> None:
 
 
 def test_the_step_that_readings_tell_is_kept() -> None:
-    found = diagnosed("quantisation", "vane", seed=73, step=6.0, origin=1.5)
-    assert found.verdict == "named"
-    (one,) = found.findings
-    assert one.term.key == ("quantisation", "vane")
-    assert one.term.values["step"] == pytest.approx(6.0, abs=1e-3)
-    step = one.parameters["step"]
-    assert step.low < 6.0 < step.high < 6.6
+    searcher = searched(SLOW)
+    null = searcher.whitener(searcher.bank.without)
+    coarse = Term(catalogue()["quantisation"], "vane", {"step": 6.0, "origin": 1.5})
+    assert coarse.is_told
+    assert fit(null, SLOW, [coarse], searcher.bank.without).terms[0].values == coarse.values
 
 
 @pytest.mark.parametrize(("interval", "same"), [((158.0, 204.0), True), ((40.0, 90.0), False)])
