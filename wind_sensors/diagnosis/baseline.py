@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.observation import (
-    ERRATIC,
-    NORMALISED_BANDS,
-    STILLNESS,
-    Channel,
-)
+from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STILLNESS, Channel
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
