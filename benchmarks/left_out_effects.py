@@ -19,7 +19,7 @@ from multiprocessing import Pool
 from pathlib import Path
 
 import numpy as np
-import yaml
+from ruamel.yaml import YAML
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import prepare
@@ -122,7 +122,7 @@ def _sized(template: Template) -> dict[str, float]:
     factor = SIZE / max(template.effect.relative_size(template.values), 0.1)
     values = dict(template.values)
     for parameter in template.effect.parameters:
-        if parameter.healthy is not None and parameter.fitted:
+        if parameter.healthy is not None and parameter.graded:
             moved = parameter.healthy + factor * (values[parameter.name] - parameter.healthy)
             values[parameter.name] = float(np.clip(moved, parameter.low, parameter.high))
     if template.effect.name == "stuck_sensor":
@@ -150,7 +150,7 @@ def own_cases(chosen: Sequence[str]) -> Iterator[Case]:
 
 def folder_cases(folder: Path) -> Iterator[Case]:
     """The single effects at three times their smallest size of a development set."""
-    answers = yaml.safe_load((folder / "answers.yaml").read_text())
+    answers = YAML(typ="safe").load(folder / "answers.yaml")
     for station in sorted(p for p in folder.iterdir() if p.is_dir()):
         baseline = learn([read_recording(p) for p in sorted(station.glob("healthy-*"))])
         for bag in sorted(station.glob("*-3")):

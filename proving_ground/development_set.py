@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from rich.progress import track
+from ruamel.yaml import YAML
 
 from proving_ground.concealed.strangers import STRANGERS
 from proving_ground.generate import (
@@ -77,7 +77,7 @@ def write_set(
     path = top / "answers.yaml"
     answers: dict[str, list[dict[str, Any]]] = {}
     if path.exists():
-        answers = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+        answers = YAML(typ="safe").load(path) or {}
     plan = [n for number in stations for kind in kinds for n in station_plan(kind, number, minutes)]
     for named in track(plan, "writing recordings"):
         if named.name in answers:

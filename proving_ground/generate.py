@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
+from ruamel.yaml import YAML
 
 from proving_ground.bag_writer import write_bag
 from proving_ground.concealed.kinds import activity_between
@@ -125,4 +125,6 @@ def _plain(entry: dict[str, Any]) -> dict[str, Any]:
 
 def write_answers(path: Path, answers: dict[str, list[dict[str, Any]]]) -> None:
     """Write an answers file: a list of concealed causes for each recording."""
-    path.write_text(yaml.safe_dump(answers, sort_keys=False, width=200), encoding="utf-8")
+    writer = YAML()
+    writer.width = 200
+    writer.dump(answers, path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
 
 from proving_ground.stations import CupRotor, Propeller, Station
 from proving_ground.tunnel import (
@@ -97,4 +97,4 @@ def _propeller(station: Station, propeller: Propeller) -> dict[str, Any]:
 
 def write_sheet(path: Path, station: Station) -> None:
     """Write the station file of a recording."""
-    path.write_text(yaml.safe_dump(station_sheet(station), sort_keys=False), encoding="utf-8")
+    YAML().dump(station_sheet(station), path)

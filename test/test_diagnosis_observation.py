@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import (
     Grid,
     rate_series,
+    step_statistics,
     stillness_statistics,
 )
 from wind_sensors.diagnosis.verdict import diagnose
@@ -77,6 +78,22 @@ def test_no_chance_reading_survives_a_long_stay_in_a_gap() -> None:
     loose[600:2400] = True
     angle[loose] = rng.uniform(-np.pi, np.pi, loose.sum())
     assert erratic(_readings(angle))[loose].all()
+
+
+def test_coarse_readings_are_told_from_those_of_a_vane_that_sticks() -> None:
+    rng = np.random.default_rng(7)
+    angle = 0.4 * rng.standard_normal(4000)
+    sticking = np.repeat(0.4 * rng.standard_normal(400), 10)
+    grid = Grid(0, 0.2, 1000)
+    for step in (1.0, 2.5, 6.0, 11.25):
+        coarse = np.radians(step) * np.round(angle / np.radians(step)) + 0.3
+        half = np.where(np.arange(4000) < 2000, coarse, angle)
+        for readings, least, most in (
+            (angle, 0.0, 0.02), (sticking, 0.0, 0.15), (half, 0.45, 0.55), (coarse, 0.9, 1.001),
+        ):  # fmt: skip
+            assert least <= step_statistics(_readings(readings), grid)[0] <= most
+    first_half = (np.arange(1000) < 500).astype(float)
+    assert step_statistics(_readings(half), grid, first_half)[0] > 0.9
 
 
 def test_sparse_readings_are_not_judged_by_their_steps() -> None:

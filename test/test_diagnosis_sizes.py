@@ -8,19 +8,20 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 
+from wind_sensors.diagnosis.acceptance import is_its_moment, overlap
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.decision import undo_each_other
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Naming, overlap
+from wind_sensors.diagnosis.explanation import Naming
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
-from wind_sensors.diagnosis.naming import is_its_moment
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.signatures import LARGER
+from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
 
 SLOW = Station.model_validate(
@@ -130,6 +131,20 @@ def test_the_step_that_readings_tell_is_kept() -> None:
     coarse = Term(catalogue()["quantisation"], "vane", {"step": 6.0, "origin": 1.5})
     assert coarse.is_told
     assert fit(null, SLOW, [coarse], searcher.bank.without).terms[0].values == coarse.values
+
+
+def test_coarse_readings_hide_no_vane_that_sticks() -> None:
+    effects = catalogue()
+    station = with_effect(STATION, effects["vane_friction"], "vane", {"friction_speed": 2.5})
+    coarse = {"step": 6.0, "origin": 1.5}
+    station = with_effect(station, effects["quantisation"], "vane", coarse)
+    found = diagnose(recorded(station, 73), baseline())
+    assert found.verdict == "named"
+    first, second = found.findings
+    assert first.term.key == ("quantisation", "vane")
+    assert second.term.key == ("vane_friction", "vane")
+    step = first.parameters["step"]
+    assert step.low < 6.0 < step.high < 6.6
 
 
 @pytest.mark.parametrize(("interval", "same"), [((158.0, 204.0), True), ((40.0, 90.0), False)])

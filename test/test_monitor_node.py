@@ -9,9 +9,9 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
-import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from nodes_harness import Graph, overrides, status, values
+from ruamel.yaml import YAML
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.monitor import MonitorNode
@@ -35,7 +35,7 @@ def _station_file(folder: Path, name: str, changes: list[dict[str, Any]]) -> str
     document["reference"] = {"topic": "/reference/wind", "separation": 0.5, "path_length": 0.15}
     document["changes"] = changes
     path = folder / name
-    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    YAML().dump(document, path)
     return str(path)
 
 

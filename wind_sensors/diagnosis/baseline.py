@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STILLNESS, Channel
+from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STEPS, STILLNESS, Channel
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -33,6 +33,7 @@ _SPECTRUM_PRIOR = 0.22
 _INTERVAL_PRIOR = np.array([0.002, 0.002, 0.003, 0.001, 0.0007, 0.001])
 _STILLNESS_PRIOR = 0.12
 _ERRATIC_PRIOR = 0.003
+_STEPS_PRIOR = 0.1
 
 
 def statistics_prior(channel: Channel) -> FloatArray:
@@ -40,7 +41,8 @@ def statistics_prior(channel: Channel) -> FloatArray:
     bands = np.full(_BANDS, _SPECTRUM_PRIOR)
     if channel.kind == "vane_angle":
         still = np.full(STILLNESS, _STILLNESS_PRIOR)
-        return np.concatenate((bands, still, np.full(ERRATIC, _ERRATIC_PRIOR)))
+        erratic, steps = np.full(ERRATIC, _ERRATIC_PRIOR), np.full(STEPS, _STEPS_PRIOR)
+        return np.concatenate((bands, still, erratic, steps))
     return np.concatenate((bands, _INTERVAL_PRIOR))
 
 

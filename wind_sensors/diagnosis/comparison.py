@@ -29,6 +29,7 @@ from wind_sensors.diagnosis.observation import (
     erratic_statistics,
     interval_statistics,
     rate_series,
+    step_statistics,
     stillness_statistics,
 )
 from wind_sensors.errors import UserError
@@ -269,6 +270,7 @@ class Comparison:
                             self.mask,
                         ),
                         erratic_statistics(readings, self.direction, self.grid, self.mask),
+                        step_statistics(readings, self.grid, self.mask),
                     )
                 )
             series[channel.name] = values

@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.explanation import LOUDEST_FACTOR, Alternative, Naming
+from wind_sensors.diagnosis.explanation import Alternative, Naming
 from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.noise_level import Excess
@@ -209,7 +210,7 @@ def determined(findings: tuple[Finding, ...]) -> bool:
 def _has_a_size(finding: Finding) -> bool:
     effect = finding.term.effect
     graded = [
-        p for p in effect.parameters if p.fitted and p.healthy is not None and p.minimum > 0.0
+        p for p in effect.parameters if p.graded and p.minimum > 0.0
     ]
     if effect.size is not None or not graded:
         return True

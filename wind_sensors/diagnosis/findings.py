@@ -90,14 +90,14 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             value = term.values[parameter.name]
             departure = 0.0 if parameter.healthy is None else value - parameter.healthy
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
-            if parameter.told and parameter.fitted:
+            if parameter.value_from == "signals" and parameter.graded:
                 noise = 0.0
             # What an inexact form adds to one component of an effect, it takes from others.
             size = max(abs(departure), term.relative_size * parameter.minimum)
             error = INTERVAL_FACTOR * float(np.hypot(noise, term.effect.form_error * size))
             place += 1
             if not np.isfinite(error):
-                if not parameter.fitted and departure != 0.0:
+                if parameter.value_from == "forms" and departure != 0.0:
                     # One form of several that were tried: the others are not excluded.
                     found[parameter.name] = Estimate(
                         value, parameter.low, parameter.high, parameter.unit

@@ -75,7 +75,7 @@ class Term:
     @property
     def is_told(self) -> bool:
         """Whether the signals tell everything about it."""
-        return self.effect.legible and all(p.told for p in self.effect.parameters)
+        return all(p.value_from == "signals" for p in self.effect.parameters)
 
 
 def planted(station: Station, terms: Sequence[Term]) -> Station:
@@ -411,6 +411,6 @@ def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, Floa
         tied = parameter.free is not None and not parameter.free(drive)
         if (tied or parameter.swing > swing) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
-        elif parameter.told or not parameter.fitted:
+        elif parameter.value_from != "fit":
             low[k] = high[k] = values_of(terms)[k]
     return low, high

@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
-from wind_sensors.diagnosis.explanation import (
+from wind_sensors.diagnosis.acceptance import (
     ACCEPTED_FURTHER_GAIN,
     ACCEPTED_GAIN,
+    inexact,
+    large_enough,
+    may_join,
+    overlap,
+    plausible,
+)
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
+from wind_sensors.diagnosis.explanation import (
     Alternative,
     Judged,
     evidence,
-    inexact,
     judged,
-    large_enough,
-    may_join,
     no_terms,
-    overlap,
-    plausible,
     total,
 )
 from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, without_term

@@ -7,30 +7,29 @@ from dataclasses import replace
 
 import numpy as np
 
+from wind_sensors.diagnosis.acceptance import (
+    brought,
+    inexactness,
+    is_a_stall,
+    is_plausible,
+    may_join,
+    needed_gain,
+    passing_gain,
+    plausible,
+)
 from wind_sensors.diagnosis.comparison import Simulated
-from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
     EQUAL_SHARE,
-    PASSING_BESIDE,
-    SMALLEST_BESIDE,
     Alternative,
     Judged,
     Naming,
     evidence,
-    inexact,
-    is_plausible,
     judged,
-    may_join,
-    needed_gain,
     no_terms,
-    overlap,
-    passing_gain,
-    plausible,
     seen_in,
-    single_event,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, covariance_of, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.search import Searcher
@@ -60,17 +59,8 @@ FAR_BEHIND = 0.8
 WORTH_JUDGING = 0.5
 """Share of the needed gain that a fit must bring before the noise is judged again."""
 
-STALL_SPEED = 4.5
-"""Up to this wind speed [m/s] a sticking bearing may hold a rotor."""
-
 WORTH_ANOTHER_TURN = 14.0
 """Largest linear score below which no further effect is looked for."""
-
-
-LONGEST_MOMENT = 0.25
-OF_A_MOMENT = 0.7
-"""An effect of which more than the second share shows in a part of the record that is no longer
-than the first has its moment there."""
 
 
 def name(
@@ -110,26 +100,6 @@ def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
     return wins and first.evidence < second.evidence - margin
 
 
-def _brings(
-    searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float
-) -> float:
-    """What a candidate gains over the terms before: in its own null and in likelihood, the less.
-
-    In its own null alone a flexible effect gains from the noise that it has fitted away. What one
-    event in the record brings does not count.
-    """
-    if not plausible(candidate.fit) or searcher.is_a_way_of_the_wind(candidate.fit.terms[-1]):
-        return -np.inf
-    whitener = candidate.whitener
-    before = (
-        fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
-        if current.terms
-        else no_terms(whitener, searcher)
-    )
-    gain = total(before) - total(candidate.fit) - single_event(searcher, before, candidate.fit)
-    return min(gain, before_evidence - candidate.evidence)
-
-
 def _leader(
     searcher: Searcher,
     whitener: Whitener,
@@ -150,16 +120,16 @@ def _leader(
     so_far = evidence(current, whitener)
     enough: list[tuple[float, Judged]] = []
     likeliest = np.inf
-    for one in sorted(ranked, key=lambda r: not r.fit.terms[-1].is_told):
+    for one in sorted(ranked, key=_not_told):
         told = one.fit.terms[-1].is_told
         if one.evidence > likeliest + CLEARLY_BETTER:
             break
-        brings = _brings(searcher, one, current, so_far)
+        brings = brought(searcher, one, current, so_far)
         newest = one.fit.terms[-1]
         least = max(
             needed_gain(current, newest, searcher.baseline),
             passing_gain(newest),
-            _inexactness(searcher, whitener, current, one.fit),
+            inexactness(searcher, whitener, current, one.fit),
         )
         if brings >= least and told:
             return one
@@ -170,6 +140,11 @@ def _leader(
         return None
     most = max(brings for brings, _ in enough)
     return next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
+
+
+def _not_told(one: Judged) -> bool:
+    """Sorts what the signals tell by themselves before what only a fit says."""
+    return not one.fit.terms[-1].is_told
 
 
 def _with_sharp_intervals(
@@ -216,46 +191,6 @@ def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
             values = {**effect.templates[0], **shared}
             found[key] = [*others, replace(last, effect=effect, values=values)]
     return list(found.values())
-
-
-def _inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> float:
-    """What a further term must bring if it acts on signals that the terms so far change."""
-    further = longer.terms[-1]
-    reached = {
-        name
-        for term in current.terms
-        for name in searcher.comparison.affected(searcher.station, term.instrument)
-    }
-    beside = further.instrument in (reached | {STATION, PLATFORM})
-    if not current.terms or not beside or further.is_told:
-        return 0.0
-    if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
-        return np.inf
-    nothing = whitener.of(searcher.bank.without)
-    own = inexact(current, float(nothing @ nothing)) * overlap(searcher, current, longer)
-    passing = further.interval != ALWAYS and not further.effect.legible
-    return PASSING_BESIDE * own if passing else own
-
-
-def is_its_moment(searcher: Searcher, current: Fit, further: Term) -> bool:
-    """Whether a passing effect holds just while the effects so far show.
-
-    What a vane reads in a gap, or a rotor in a wake, need not be what is simulated there.
-    """
-    if further.interval == ALWAYS:
-        return False
-    comparison = searcher.comparison
-    at = comparison.grid.centres + comparison.drive.elapsed
-    begin, end = further.interval
-    inside = (at >= begin) & (at < (np.inf if end is None else end))
-    if np.mean(inside) > LONGEST_MOMENT:
-        return False
-    shown = sum(
-        (current.simulated.series[c.name] - searcher.bank.without.series[c.name]) ** 2
-        for c in comparison.channels
-        if c.instrument in comparison.affected(searcher.station, further.instrument)
-    )
-    return float(np.sum(shown * inside)) > OF_A_MOMENT * float(np.sum(shown))
 
 
 def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
@@ -346,9 +281,14 @@ def _greedy(
         # each in the null that it leaves itself.
         best = total(fits[0])
         reach = FAR_BEHIND * (total(current) - best)
-        pool = [f for f in fits[:FINALISTS] if total(f) - best <= reach]
-        ranked = judged(searcher, pool, named, roughly=True)
-        ranked = judged(searcher, [r.fit for r in ranked if plausible(r.fit)][:CONTENDERS], named)
+        pool = [
+            f
+            for place, f in enumerate(fits)
+            if f.terms[-1].is_told or (place < FINALISTS and total(f) - best <= reach)
+        ]
+        ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
+        ranked.sort(key=_not_told)
+        ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
         ranked = [r for r in ranked if plausible(r.fit)]
         ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
         leader = _leader(searcher, whitener, current, ranked)
@@ -407,20 +347,3 @@ def _without_implausible(searcher: Searcher, whitener: Whitener, current: Fit) -
     return current
 
 
-def is_a_stall(searcher: Searcher, current: Fit, start: Term) -> bool:
-    """Whether a rotor's silence is what a braked bearing does in the wind of that time.
-
-    A bearing that sticks lets go later than the simulated friction does.
-    """
-    braked = any(t.effect.name == "bearing_friction" for t in current.terms)
-    if start.effect.name != "stuck_sensor" or not braked:
-        return False
-    comparison = searcher.comparison
-    for channel in comparison.channels:
-        if channel.instrument == start.instrument and channel.kind == "rotor_rate":
-            at = comparison.grid.centres + comparison.drive.elapsed
-            inside = (at > start.values["start"]) & (at < start.values["stop"])
-            if not inside.any():
-                return False
-            return float(np.median(comparison.speed[inside])) < STALL_SPEED
-    return False

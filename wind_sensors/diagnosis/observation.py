@@ -32,6 +32,27 @@ LOWEST_BAND_FREQUENCY = 0.12
 INTERVALS = 6
 """Number of statistics of the pulse intervals."""
 
+STATISTICS = {
+    "rotor_rate": (
+        "share of long pulse intervals",
+        "share of short pulse intervals",
+        "unevenness of the slots",
+        "unevenness of the slots once per turn",
+        "beat of the pulses with the wind, once per turn",
+        "beat of the pulses with the wind, twice per turn",
+    ),
+    "vane_angle": (
+        "smallest turns in slow wind",
+        "small turns in slow wind",
+        "small turns in faster wind",
+        "share of erratic readings",
+        "direction in which readings are erratic",
+        "direction in which readings are erratic",
+        "steps of the readings",
+    ),
+}
+"""What the statistics of a channel beyond its spectrum are, for people."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -230,6 +251,47 @@ def erratic_statistics(
     return np.array(
         [np.mean(wrong), np.mean(wrong * np.cos(heading)), np.mean(wrong * np.sin(heading))]
     )
+
+
+STEPS = 1
+"""Number of statistics of coarse readings."""
+
+_STEP_PARTS = 4
+_FINE = 0.05
+_WAVES = (0.6, 1.25)
+"""Waves per degree: for steps from 0.8 degrees on, a multiple of one over the step is there."""
+
+
+def step_statistics(
+    angles: Angles, grid: Grid, mask: FloatArray | None = None
+) -> FloatArray:
+    """How far a vane's readings come in even steps, 0 (not at all) to 1 (all of them).
+
+    Steps tell themselves by readings that lie a whole number of them apart. A vane that sticks
+    repeats its readings, too, but at any angle.
+
+    Args:
+        angles: Readings.
+        grid: Bins.
+        mask: Weight of the bins; those below a half do not count.
+
+    Returns:
+        Largest power of the readings' distribution at a fine wave, mean over parts of the record.
+    """
+    place = np.floor(grid.seconds(angles.time) / grid.dt).astype(np.intp)
+    counted = np.isfinite(angles.angle) & (place >= 0) & (place < grid.n)
+    if mask is not None:
+        counted[counted] = mask[place[counted]] > 0.5
+    size = round(360.0 / _FINE)
+    fine = np.floor(np.degrees(angles.angle[counted]) / _FINE).astype(np.intp) % size
+    low, high = (round(2.0 * wave * 360.0) for wave in _WAVES)
+    powers = []
+    for part in np.array_split(fine, _STEP_PARTS):
+        if part.size:
+            counts = np.bincount(part, minlength=size) / part.size
+            waves = np.abs(np.fft.rfft(counts, 2 * size)[low : high + 1])
+            powers.append(float(np.max(waves)) ** 2)
+    return np.array([np.mean(powers) if powers else 0.0])
 
 
 LEAST_TURNS = 150

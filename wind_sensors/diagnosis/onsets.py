@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.acceptance import plausible
 from wind_sensors.diagnosis.comparison import Simulated
-from wind_sensors.diagnosis.explanation import plausible, seen_in, total
+from wind_sensors.diagnosis.explanation import seen_in, total
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit, planted
 from wind_sensors.diagnosis.intervals import (
     IntervalGains,

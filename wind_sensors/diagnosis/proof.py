@@ -97,7 +97,7 @@ def prove(
     ]
     low, high = np.quantile(drawn, (0.025, 0.975))
     rivals = [fold_of(*way, station, placebo) for way in ways] if placebo else []
-    parameters = sum(p.fitted for term in terms for p in term.effect.parameters)
+    parameters = sum(p.value_from == "fit" for term in terms for p in term.effect.parameters)
     smooth = [_curve(*way, parameters) for way in ways]
     size = sum(fold.vector.size for fold in folds)
     series = [f.vector[: _series_size(s)] for f, (_, s) in zip(folds, ways, strict=True)]

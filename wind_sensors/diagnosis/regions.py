@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.comparison import BANDS, LOW_END, Comparison, Simulated
-from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STATISTICS, Channel
 from wind_sensors.diagnosis.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
@@ -216,7 +216,7 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
         size = comparison.measured.statistics[channel.name].size
         for k in range(size):
             kind = "spectrum" if k < BANDS else "statistic"
-            label = f"band {k + 1} of the spectrum" if k < BANDS else f"statistic {k - BANDS + 1}"
+            label = _eddies(channel, k) if k < BANDS else STATISTICS[channel.kind][k - BANDS]
             statistics.append(
                 (Region(channel.name, kind, float(k), float(k + 1), label), place + k)
             )
@@ -235,6 +235,11 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
         maxima.append(bank.scores(drawn).max(axis=1))
     null = np.concatenate(maxima)[:DRAWS]
     return RegionBank(bank.regions, bank.signatures, bank.bands, bank.statistics, null)
+
+
+def _eddies(channel: Channel, band: int) -> str:
+    longest, shortest = 2.0 * np.pi * channel.length / NORMALISED_BANDS[band : band + 2]
+    return f"power of eddies of {shortest:.3g} to {longest:.3g} m"
 
 
 def excess_in(

@@ -117,7 +117,7 @@ def starting_values(score: Score) -> dict[str, float]:
     effect = score.template.effect
     values = {p.name: (0.0 if p.healthy is None else p.healthy) for p in effect.parameters}
     for parameter in effect.parameters:
-        if parameter.healthy is None or not parameter.fitted:
+        if not parameter.graded:
             values[parameter.name] = score.template.values[parameter.name]
     joint = len(score.amplitudes) > 1
     for number, amplitude in score.amplitudes.items():
@@ -125,7 +125,7 @@ def starting_values(score: Score) -> dict[str, float]:
         if not joint and number != score.template.number:
             continue
         for parameter in effect.parameters:
-            if parameter.healthy is not None and parameter.fitted:
+            if parameter.healthy is not None and parameter.graded:
                 departure = template[parameter.name] - parameter.healthy
                 values[parameter.name] += amplitude * departure
     for parameter in effect.parameters:

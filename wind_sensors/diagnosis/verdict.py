@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration, too_calm
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
@@ -26,7 +27,7 @@ from wind_sensors.diagnosis.decision import (
 )
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
-from wind_sensors.diagnosis.explanation import ACCEPTED_GAIN, Naming
+from wind_sensors.diagnosis.explanation import Naming
 from wind_sensors.diagnosis.findings import Finding, Unexplained, equal_explanations, findings_of
 from wind_sensors.diagnosis.fitting import planted
 from wind_sensors.diagnosis.guesses import guesses_of

@@ -36,9 +36,8 @@ class Parameter:
         free: Whether what drives the recording lets it be fitted; None: always.
         swing: Smallest change of the air's temperature within the record [K] that the parameter
             needs; with less it keeps its healthy value.
-        fitted: A parameter that is not keeps the value that it starts with (one form of an effect
-            or another).
-        told: The signals tell it better than a fit can, which keeps it.
+        value_from: The `fit`; the `signals`, which tell it better than a fit can; or several
+            `forms` of the effect, each of which is tried as it is.
     """
 
     name: str
@@ -52,8 +51,7 @@ class Parameter:
     wraps: float = 0.0
     swing: float = 0.0
     free: Callable[[Drive], bool] | None = None
-    fitted: bool = True
-    told: bool = False
+    value_from: Literal["fit", "signals", "forms"] = "fit"
 
     @property
     def difference(self) -> float:
@@ -61,6 +59,11 @@ class Parameter:
         if self.step:
             return self.step
         return 0.1 * self.minimum if self.minimum else 0.02 * (self.high - self.low)
+
+    @property
+    def graded(self) -> bool:
+        """Whether it comes in sizes between health and worse."""
+        return self.healthy is not None and self.value_from != "forms"
 
 
 @dataclass(frozen=True)
@@ -96,8 +99,6 @@ class Effect:
         exact: Its form is certain (geometry, electronics, arithmetic); what others leave beside
             them may be their own form.
         form_error: Standard error of a size, relative to it, that the simulation's form leaves.
-        legible: The signals themselves tell its size, when it begins and when it ends: a beginning
-            or an end is neither searched for nor paid for.
         noisy: What it does is drawn at random or hangs on the last digit (whether a vane sticks
             or slips), so that its simulation adds noise of its own.
         needs: Data without which it cannot be seen.
@@ -123,7 +124,6 @@ class Effect:
     smooths: bool = False
     exact: bool = False
     form_error: float = 0.025
-    legible: bool = False
     noisy: bool = False
     standing: float = 0.1
     standing_in_calm: float = 0.0
@@ -133,6 +133,14 @@ class Effect:
     def __reduce__(self) -> tuple[Callable[[str], Effect], tuple[str]]:
         """Effects travel between processes by their name."""
         return _named, (self.name,)
+
+    @property
+    def legible(self) -> bool:
+        """Whether the signals themselves tell that it is there, when it begins and when it ends.
+
+        A beginning or an end is then neither searched for nor paid for.
+        """
+        return any(p.value_from == "signals" for p in self.parameters)
 
     def scaled(self, values: Values, factor: float) -> dict[str, float]:
         """Values with their departure from health multiplied, within their bounds."""

@@ -175,13 +175,12 @@ STUCK_SENSOR = Effect(
     parameters=(
         Parameter("start", "s", -1.0, 1e6, healthy=None, step=1.0),
         Parameter("stop", "s", 0.0, 1e6, healthy=None, step=1.0),
-        Parameter("reading", "deg", -540.0, 540.0, healthy=None, fitted=False),
-        Parameter("known", "1", 0.0, 1.0, healthy=None, fitted=False),
+        Parameter("reading", "deg", -540.0, 540.0, healthy=None, value_from="signals"),
+        Parameter("known", "1", 0.0, 1.0, healthy=None, value_from="signals"),
     ),
     applies=_is_sensor,
     update=_outage,
     exact=True,
-    legible=True,
     templates=(),
     confusable={
         "vane_friction": "turn the vane by hand",

@@ -100,7 +100,7 @@ BEARING_FRICTION = Effect(
             "temperature_coefficient", "1/K", -0.4, 0.05, step=0.005, swing=3.0,
             starts=(-0.05, -0.12),
         ),
-        Parameter("breakaway", "1", 1.0, 5.0, healthy=1.0, fitted=False),
+        Parameter("breakaway", "1", 1.0, 5.0, healthy=1.0, value_from="forms"),
     ),
     applies=_is_rotor,
     update=_friction,

@@ -110,7 +110,8 @@ def shortlist(registry: Registry, evidence: Sequence[Evidence]) -> list[Score]:
 
 def _free(effect: Effect, values: Mapping[str, float]) -> int:
     return sum(
-        p.fitted and (p.healthy is None or values[p.name] != p.healthy) for p in effect.parameters
+        p.value_from != "forms" and (p.healthy is None or values[p.name] != p.healthy)
+        for p in effect.parameters
     )
 
 
