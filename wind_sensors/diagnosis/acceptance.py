@@ -11,6 +11,7 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import Judged, no_terms, total
 from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.reference_lag import is_a_way_of_the_wind
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
@@ -33,7 +34,7 @@ wandering of the reference with sizes that undo each other."""
 ACCEPTED_FURTHER_GAIN = 32.0
 """The same for a second effect on the same signals."""
 
-ACCEPTED_ELSEWHERE_GAIN = 22.0
+ACCEPTED_ELSEWHERE_GAIN = 18.0
 """The same for a second effect on signals that the first does not reach."""
 
 FURTHER_SHARE = 0.1
@@ -109,7 +110,9 @@ def brought(
     In its own null alone a flexible effect gains from the noise that it has fitted away. What one
     event in the record brings does not count.
     """
-    if not plausible(candidate.fit) or searcher.is_a_way_of_the_wind(candidate.fit.terms[-1]):
+    if not plausible(candidate.fit) or is_a_way_of_the_wind(
+        searcher.comparison, candidate.fit.terms[-1]
+    ):
         return -np.inf
     whitener = candidate.whitener
     before = (

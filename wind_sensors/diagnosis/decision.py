@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.explanation import Alternative, Naming
 from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.intervals import cell_signatures
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.regions import RegionBank
 from wind_sensors.station.model import Station
@@ -64,12 +65,20 @@ LEAST_CHANGE = 30.0
 """Two effects that change a signal must together change it by this share of the sum of what each
 does, in squares, if that is more than the second."""
 
+PARTS = 8
+VARIES = 16.0
+VARIES_SHARE = 0.02
+"""What always holds is the same in every part, half and quarter of the record: a size of its own in
+one of them must not drop the cost by more than this, or than this share of the gain."""
+
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
 nothing up or down."""
 
 MOST_FREE_PARAMETERS = 2
-"""An explanation with more parameters must also stand out somewhere in the data."""
+CERTAIN_GAIN = 50.0
+"""An explanation with more parameters that brings less than this must also stand out somewhere in
+the data."""
 
 TOO_BLUNT = 6.0
 """A record that shows no effect below this many smallest sizes is inconclusive."""
@@ -172,6 +181,37 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
     return False
 
 
+def varies(naming: Naming, station: Station) -> bool:
+    """Whether an effect that should hold throughout has another size in a part of the record.
+
+    What acts in one sector or in lulls has other wind in every part.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    left = null.of(naming.fit.simulated)
+    cuts = np.linspace(0.0, comparison.grid.n * comparison.grid.dt, PARTS + 1)
+    series = comparison.coefficients * len(comparison.channels)
+    most = max(VARIES, VARIES_SHARE * naming.gain)
+    for term in naming.fit.terms:
+        if term.interval != ALWAYS or term.effect.occasional or term.is_told:
+            continue
+        others = [t for t in naming.fit.terms if t is not term]
+        without = comparison.simulate(planted(station, others))
+        cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
+        cells[:, series:] = 0.0
+        cells = null.through_standing(cells)
+        for length in (1, 2, 4):
+            parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
+            power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
+            if np.any((parts @ left) ** 2 / power > most):
+                return True
+    return False
+
+
 def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
@@ -252,8 +292,8 @@ def verdict_of(
         if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
             return "inconclusive"
         return "none"
-    if naming.fit.active > MOST_FREE_PARAMETERS and located_p > REMAINDER_P:
-        # Many parameters that no region of the data asks for.
+    asked_for = located_p <= REMAINDER_P or naming.gain > CERTAIN_GAIN
+    if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
     rivals = remainder.score > RIVAL_SCORE and p < REMAINDER_P and share > RIVAL_SHARE
     if (structured and share > REMAINDER_SHARE) or rivals or _patchwork(naming):

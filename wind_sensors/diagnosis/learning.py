@@ -21,7 +21,8 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, with_effect
 from wind_sensors.diagnosis.noise_level import learnt_levels, levels
 from wind_sensors.diagnosis.observation import channels_of
-from wind_sensors.diagnosis.screening import scores_of
+from wind_sensors.diagnosis.reference_lag import lag_weights
+from wind_sensors.diagnosis.screening import is_possible, scores_of
 from wind_sensors.diagnosis.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_PARAMETER,
@@ -204,6 +205,7 @@ class Evidence:
         inner: Products of the catalogue's signatures when every effect may stand at its least
             size, shape (k, k).
         inner_seen: The same with the residual, shape (k,).
+        lag: Delays that the wind's way may bring, as sums of the catalogue's signatures.
     """
 
     probes: tuple[Template, ...]
@@ -211,6 +213,7 @@ class Evidence:
     seen: FloatArray
     inner: FloatArray
     inner_seen: FloatArray
+    lag: FloatArray
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -237,6 +240,7 @@ def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
         seen=probed @ residual,
         inner=white @ white.T,
         inner_seen=white @ whitener.through_standing(residual),
+        lag=lag_weights(comparison, templates),
     )
 
 
@@ -300,7 +304,8 @@ def loudest_gains(rows: Sequence[Evidence]) -> dict[str, float]:
 
     Returns:
         By instrument (or `station`, `platform`), drop of the cost beyond what the parameters cost;
-        nothing with fewer than three recordings.
+        nothing with fewer than three recordings. The wind's way from the reference is taken for
+        granted, as the search does.
     """
     loudest: dict[str, float] = {}
     if len(rows) < 3:
@@ -312,14 +317,12 @@ def loudest_gains(rows: Sequence[Evidence]) -> dict[str, float]:
         standing = np.array([max(sizes.get(t.key, 0.0), t.smallest_standing) for t in own])
         shared = np.array([means.get(t.key, 0.0) for t in own])
         seen = row.seen - row.gram[:, : len(own)] @ shared
-        kept = np.flatnonzero(standing > 0.0)
-        part = row.gram[:, kept]
-        inner = np.linalg.solve(
-            np.diag(1.0 / standing[kept] ** 2) + row.gram[np.ix_(kept, kept)], part.T
-        )
-        gram = row.gram - part @ inner
-        seen = seen - inner.T @ seen[kept]
-        for score in scores_of(row.probes, gram, seen):
+        usual = np.concatenate((np.diag(standing)[standing > 0.0], row.lag))
+        part = usual @ row.gram[: len(own)]
+        inner = np.linalg.solve(np.eye(len(usual)) + part[:, : len(own)] @ usual.T, part)
+        gram = row.gram - part.T @ inner
+        seen = seen - inner.T @ (usual @ seen[: len(own)])
+        for score in filter(is_possible, scores_of(row.probes, gram, seen)):
             parameters = len(score.template.effect.parameters)
             cost = PENALTY_PER_PARAMETER + PENALTY_PER_FURTHER_PARAMETER * (parameters - 1)
             before = loudest.get(score.instrument, 0.0)

@@ -65,7 +65,8 @@ def merged(
 ) -> Fit:
     """One effect in the place of several, where it does nearly as well.
 
-    None takes the place of what the signals tell.
+    None takes the place of what the signals tell. One of the several themselves has to come as
+    close as the others would have had to bring; another one may miss more.
 
     Args:
         searcher: The search.
@@ -98,8 +99,9 @@ def merged(
     if not ranked:
         return current
     alone = ranked[0]
-    own = inexact(alone.fit, nothing.cost) * overlap(searcher, alone.fit, current)
-    margin = ACCEPTED_FURTHER_GAIN + own
+    margin = inexact(alone.fit, nothing.cost) * overlap(searcher, alone.fit, current)
+    if alone.fit.terms[0].key not in {t.key for t in current.terms}:
+        margin += ACCEPTED_FURTHER_GAIN
     if alone.evidence < evidence(current, whitener) + margin:
         return alone.fit
     return current

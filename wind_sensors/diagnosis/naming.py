@@ -31,7 +31,7 @@ from wind_sensors.diagnosis.explanation import (
 )
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
-from wind_sensors.diagnosis.onsets import refined_interval, window_starts, with_interval
+from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.signatures import in_parallel
 from wind_sensors.diagnosis.whitening import Whitener
@@ -138,8 +138,22 @@ def _leader(
             likeliest = min(likeliest, one.evidence)
     if not enough:
         return None
+    enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough)]
     most = max(brings for brings, _ in enough)
     return next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
+
+
+def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -> bool:
+    """Whether an effect that passes would explain nearly as much if it always held."""
+    newest = one.fit.terms[-1]
+    if newest.interval == ALWAYS or newest.effect.legible:
+        return False
+    return any(
+        other.fit.terms[-1].key == newest.key
+        and other.fit.terms[-1].interval == ALWAYS
+        and other.evidence < one.evidence + ONSET_GAIN
+        for _, other in others
+    )
 
 
 def _not_told(one: Judged) -> bool:

@@ -112,6 +112,11 @@ def scores_of(templates: Sequence[Template], gram: FloatArray, seen: FloatArray)
     return sorted(found.values(), key=lambda s: -s.gain)
 
 
+def is_possible(score: Score) -> bool:
+    """Whether the effect can be there as the score has it: no wake speeds the wind up."""
+    return score.template.effect.relative_size(starting_values(score)) > 0.0
+
+
 def starting_values(score: Score) -> dict[str, float]:
     """Parameters at which a nonlinear fit of a scored effect begins."""
     effect = score.template.effect

@@ -11,9 +11,10 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import calm_share
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
-from wind_sensors.diagnosis.effects.definition import STATION, Effect
+from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
+from wind_sensors.diagnosis.reference_lag import lag_weights
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
     Score,
@@ -42,18 +43,6 @@ FloatArray = npt.NDArray[np.float64]
 LEAST_GAIN = 6.0
 LEAST_SHARE = 0.03
 """Effects whose linear score stays below this, or below this share of the best, are not fitted."""
-
-SLOW_WIND = 0.1
-"""Quantile of the wind's speed that takes longest from the reference to the instruments."""
-
-DETOUR = 1.5
-"""Delays are up to so many times longer than the way at that speed."""
-
-COMMON_LAG = 0.5
-"""Standard deviation of the common delay, in separations over the wind's speed."""
-
-SINGLE_LAG = 0.25
-"""The same of what a channel adds of its own, and of the change within half a record."""
 
 FIRST_ITERATIONS = 3
 """Gauss-Newton steps from each starting point of a candidate."""
@@ -132,7 +121,7 @@ class Searcher:
         )
         means = np.array([self.baseline.means.get(t.key, 0.0) for t in templates])
         signatures = self.bank.whitened(self.comparison, trust)
-        lag = self._reference_lag(signatures)
+        lag = lag_weights(self.comparison, templates) @ signatures
         signatures = np.concatenate((signatures, lag))
         standing = np.concatenate((standing, np.ones(len(lag))))
         means = np.concatenate((means, np.zeros(len(lag))))
@@ -142,48 +131,6 @@ class Searcher:
             standing = np.concatenate((standing, np.ones(len(form))))
             means = np.concatenate((means, np.zeros(len(form))))
         return whitener_of(self.comparison, trust, signatures, standing, means)
-
-    def _reference_lag(self, signatures: FloatArray) -> FloatArray:
-        """Signatures of the delay between reference and instruments, shape (k, m).
-
-        The wind takes up to separation / speed from one to the other, less when it comes from
-        aside. It is common to all channels, but not all of them follow the same eddies; and it
-        changes while the wind turns, which looks like a clock that drifts. No rows for a reference
-        at the same place.
-        """
-        reference = self.comparison.recording.station.reference
-        distance = 0.0 if reference is None else reference.separation
-        delay = distance / float(np.mean(self.comparison.speed))
-        half = 0.5 * self.comparison.grid.n * self.comparison.grid.dt
-        common, drifting = np.zeros((2, signatures.shape[1]))
-        rows = []
-        for template, signature in zip(self.bank.templates, signatures, strict=True):
-            if template.number != 0 or template.instrument == STATION:
-                continue
-            if template.effect.name == "timestamp_latency":
-                one = signature * (delay / template.values["latency"])
-                common += COMMON_LAG * one
-                rows.append(SINGLE_LAG * one)
-            elif template.effect.name == "clock_drift":
-                drift = 1e6 * delay / half
-                drifting += SINGLE_LAG * signature * (drift / template.values["drift"])
-        found = np.array([common, drifting, *rows])
-        return np.asarray(found[np.any(found, axis=1)])
-
-    def is_a_way_of_the_wind(self, term: Term) -> bool:
-        """Whether a delay is no longer than the wind takes between reference and instruments.
-
-        A drift may come from delays of either sign at the record's ends.
-        """
-        reference = self.comparison.recording.station.reference
-        distance = 0.0 if reference is None else reference.separation
-        way = DETOUR * distance / float(np.quantile(self.comparison.speed, SLOW_WIND))
-        if term.effect.name == "timestamp_latency":
-            return abs(term.values["latency"]) < way
-        if term.effect.name == "clock_drift":
-            length = self.comparison.grid.n * self.comparison.grid.dt
-            return abs(term.values["drift"]) * 1e-6 * length < 2.0 * way
-        return False
 
     def white_signatures(self, whitener: Whitener) -> FloatArray:
         """Signatures of the probes in a null, one a row."""

@@ -123,11 +123,14 @@ def templates_of(
 
 
 def _larger_templates(templates: Iterable[Template]) -> list[Template]:
-    """Larger sizes of the effects that have one template and whose bounds allow them."""
+    """Larger sizes of the effects that have one template and whose bounds allow them.
+
+    Not of delays: what a boat's sway or a gust shows four times as late is another signal.
+    """
     out = []
     for template in templates:
         effect = template.effect
-        if len(effect.templates) > 1:
+        if len(effect.templates) > 1 or effect.entrance == "clock":
             continue
         for multiple in LARGER:
             values = effect.scaled(template.values, multiple)

@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.decision import (
     remainder_of,
     stands_out,
     undo_each_other,
+    varies,
     verdict_of,
     with_own_noise,
 )
@@ -193,7 +194,11 @@ def diagnose(
     if refuted:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
         verdict, findings = ("unknown" if stands_out(findings) else "none"), ()
-    made = made_up(findings, comparison) or undo_each_other(naming, baseline.station)
+    made = (
+        made_up(findings, comparison)
+        or undo_each_other(naming, baseline.station)
+        or varies(naming, baseline.station)
+    )
     if findings and (made or not determined(findings)):
         verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()

@@ -1,0 +1,73 @@
+"""How loud healthy days are: the wind's way and impossible effects do not make them so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_diagnosis_naming import STATION, recorded
+
+from wind_sensors.diagnosis.comparison import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.learning import Evidence, default_baseline, loudest_gains
+from wind_sensors.diagnosis.reference_lag import lag_weights
+from wind_sensors.diagnosis.search import searcher_of
+from wind_sensors.diagnosis.signatures import Template, templates_of
+
+QUIET, LOUD = 0.0, 60.0
+POWER = 100.0
+
+
+def days(effect: str, instrument: str, sign: float, lag: float) -> list[Evidence]:
+    """Three healthy days, of which the last promises an effect a gain of `LOUD`.
+
+    Args:
+        effect, instrument: Which.
+        sign: Of the amplitude.
+        lag: Standard deviation of what the wind's way brings, in units of the effect's signature.
+    """
+    known = catalogue()[effect]
+    probe = Template(known, instrument, 0, known.templates[0])
+    gram, inner = np.full((1, 1), POWER), np.full((1, 1), POWER)
+    none = np.zeros(1)
+    return [
+        Evidence((probe,), gram, np.array([sign * np.sqrt(POWER * gain)]), inner, none, way)
+        for gain in (QUIET, QUIET, LOUD)
+        for way in [np.full((1, 1), lag) if lag else np.zeros((0, 1))]
+    ]
+
+
+def test_a_delay_of_the_winds_way_makes_no_day_loud() -> None:
+    loud = loudest_gains(days("timestamp_latency", "vane", 1.0, 0.0))
+    usual = loudest_gains(days("timestamp_latency", "vane", 1.0, 1.0))
+    assert loud["vane"] > 20.0
+    assert usual.get("vane", 0.0) < 1.0
+
+
+@pytest.mark.parametrize("effect", ["low_pass_filter", "wake_shadow"])
+def test_what_cannot_be_makes_no_day_loud(effect: str) -> None:
+    instrument = "vane" if effect == "low_pass_filter" else "cup"
+    assert loudest_gains(days(effect, instrument, 1.0, 0.0))[instrument] > 20.0
+    assert instrument not in loudest_gains(days(effect, instrument, -1.0, 0.0))
+
+
+def test_the_way_is_that_of_the_separation_at_the_wind_speed() -> None:
+    comparison = prepare(recorded(STATION, 77))
+    templates = templates_of(comparison, STATION, catalogue())
+    weights = lag_weights(comparison, templates)
+    assert STATION.reference is not None
+    way = STATION.reference.separation / float(np.mean(comparison.speed))
+    for k, template in enumerate(templates):
+        delays = weights[:, k] * template.values.get("latency", 0.0)
+        if template.effect.name == "timestamp_latency" and template.number == 0:
+            several = [] if template.instrument == "station" else [0.5 * way, 0.25 * way]
+            assert np.sort(delays[delays > 0.0])[::-1] == pytest.approx(several)
+        elif template.effect.name != "clock_drift":
+            assert not weights[:, k].any()
+
+
+def test_delays_are_not_screened_at_larger_sizes() -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 77)), default_baseline(STATION),
+                           catalogue(), {})  # fmt: skip
+    larger = {t.effect.name for t in searcher.probes.templates if t.multiple != 1.0}
+    assert "calibration_offset" in larger
+    assert not larger & {"clock_drift", "timestamp_latency"}

@@ -1,0 +1,82 @@
+"""Delays that are no fault: the wind's way from the reference to the instruments.
+
+It takes up to separation / speed, less when it comes from aside. That is common to all channels,
+but not all of them follow the same eddies; and it changes while the wind turns, which looks like a
+clock that drifts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.effects.definition import STATION
+from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.diagnosis.signatures import Template
+
+FloatArray = npt.NDArray[np.float64]
+
+SLOW_WIND = 0.1
+"""Quantile of the wind's speed that takes longest from the reference to the instruments."""
+
+DETOUR = 1.5
+"""Delays are up to so many times longer than the way at that speed."""
+
+COMMON_LAG = 0.5
+"""Standard deviation of the common delay, in separations over the wind's speed."""
+
+SINGLE_LAG = 0.25
+"""The same of what a channel adds of its own, and of the change within half a record."""
+
+
+def lag_weights(comparison: Comparison, templates: Sequence[Template]) -> FloatArray:
+    """One standard deviation of each delay that the wind's way may bring, as sums of templates.
+
+    Args:
+        comparison: The recording.
+        templates: Effects, those of the clocks among them.
+
+    Returns:
+        Shape (k, templates): the delay and the drift common to all channels, and the delay of each;
+        no rows for a reference at the same place.
+    """
+    delay = _separation(comparison) / float(np.mean(comparison.speed))
+    half = 0.5 * comparison.grid.n * comparison.grid.dt
+    common, drifting = np.zeros((2, len(templates)))
+    rows = []
+    for k, template in enumerate(templates):
+        if template.number != 0 or template.multiple != 1.0 or template.instrument == STATION:
+            continue
+        if template.effect.name == "timestamp_latency":
+            one = delay / template.values["latency"]
+            common[k] = COMMON_LAG * one
+            row = np.zeros(len(templates))
+            row[k] = SINGLE_LAG * one
+            rows.append(row)
+        elif template.effect.name == "clock_drift":
+            drifting[k] = SINGLE_LAG * 1e6 * delay / half / template.values["drift"]
+    found = np.array([common, drifting, *rows])
+    return np.asarray(found[np.any(found, axis=1)])
+
+
+def is_a_way_of_the_wind(comparison: Comparison, term: Term) -> bool:
+    """Whether a delay is no longer than the wind takes between reference and instruments.
+
+    A drift may come from delays of either sign at the record's ends.
+    """
+    slow = float(np.quantile(comparison.speed, SLOW_WIND))
+    way = DETOUR * _separation(comparison) / slow
+    if term.effect.name == "timestamp_latency":
+        return abs(term.values["latency"]) < way
+    if term.effect.name == "clock_drift":
+        length = comparison.grid.n * comparison.grid.dt
+        return abs(term.values["drift"]) * 1e-6 * length < 2.0 * way
+    return False
+
+
+def _separation(comparison: Comparison) -> float:
+    reference = comparison.recording.station.reference
+    return 0.0 if reference is None else reference.separation
