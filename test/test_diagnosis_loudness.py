@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, recorded
@@ -30,7 +32,7 @@ def days(effect: str, instrument: str, sign: float, lag: float) -> list[Evidence
     gram, inner = np.full((1, 1), POWER), np.full((1, 1), POWER)
     none = np.zeros(1)
     return [
-        Evidence((probe,), gram, np.array([sign * np.sqrt(POWER * gain)]), inner, none, way)
+        Evidence((probe,), gram, np.array([sign * np.sqrt(POWER * gain)]), gram, inner, none, way)
         for gain in (QUIET, QUIET, LOUD)
         for way in [np.full((1, 1), lag) if lag else np.zeros((0, 1))]
     ]
@@ -63,6 +65,18 @@ def test_the_way_is_that_of_the_separation_at_the_wind_speed() -> None:
             assert np.sort(delays[delays > 0.0])[::-1] == pytest.approx(several)
         elif template.effect.name != "clock_drift":
             assert not weights[:, k].any()
+
+
+def test_what_healthy_days_share_is_in_the_series_for_statistics_have_their_own_means() -> None:
+    comparison = prepare(recorded(STATION, 77))
+    templates = templates_of(comparison, STATION, catalogue())
+    sticking = {t.key: 0.5 for t in templates if t.effect.name == "vane_friction"}
+    known = replace(default_baseline(STATION), means=sticking)
+    searcher = searcher_of(comparison, known, catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    series = comparison.coefficients * len(comparison.channels)
+    assert np.abs(null.shared[:series]).max() > 0.1
+    assert not null.shared[series:].any()
 
 
 def test_delays_are_not_screened_at_larger_sizes() -> None:

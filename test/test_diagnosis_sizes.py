@@ -11,7 +11,7 @@ from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 from wind_sensors.diagnosis.acceptance import is_its_moment, overlap
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import undo_each_other
+from wind_sensors.diagnosis.decision import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import Naming
@@ -207,3 +207,23 @@ def test_effects_that_take_each_other_back_explain_nothing(gain: float, opposed:
     both = fit(null, STATION, terms, None, iterations=0)
     naming = Naming(both, null, null, null.of(searcher.bank.without), 0.0)
     assert undo_each_other(naming, STATION) is opposed
+
+
+@pytest.mark.parametrize(
+    ("planted", "values", "growing"),
+    [("timestamp_latency", {"latency": 0.5}, False), ("clock_drift", {"drift": 2500.0}, True)],
+)
+def test_a_delay_that_grows_is_no_latency(
+    planted: str, values: dict[str, float], growing: bool
+) -> None:
+    station = with_effect(STATION, catalogue()[planted], "vane", values)
+    recording = replace(recorded(station, 72), station=STATION)
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    late = Term(catalogue()["timestamp_latency"], "vane", {"latency": 0.5})
+    named = fit(null, STATION, [late], searcher.bank.without)
+    adequate = searcher.whitener(named.simulated, named.simulated)
+    nothing = null.of(searcher.bank.without)
+    gain = float(nothing @ nothing) - named.cost
+    assert gain > 40.0
+    assert varies(Naming(named, null, adequate, nothing, gain), STATION) is growing

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.intervals import cell_signatures
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.regions import RegionBank
+from wind_sensors.diagnosis.whitening import in_series
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -66,7 +67,7 @@ LEAST_CHANGE = 30.0
 does, in squares, if that is more than the second."""
 
 PARTS = 8
-VARIES = 16.0
+VARIES = 18.0
 VARIES_SHARE = 0.02
 """What always holds is the same in every part, half and quarter of the record: a size of its own in
 one of them must not drop the cost by more than this, or than this share of the gain."""
@@ -184,7 +185,8 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
 def varies(naming: Naming, station: Station) -> bool:
     """Whether an effect that should hold throughout has another size in a part of the record.
 
-    What acts in one sector or in lulls has other wind in every part.
+    What acts in one sector or in lulls has other wind in every part, and what is drawn at random
+    other luck.
 
     Args:
         naming: The explanation.
@@ -194,16 +196,14 @@ def varies(naming: Naming, station: Station) -> bool:
     comparison = null.comparison
     left = null.of(naming.fit.simulated)
     cuts = np.linspace(0.0, comparison.grid.n * comparison.grid.dt, PARTS + 1)
-    series = comparison.coefficients * len(comparison.channels)
     most = max(VARIES, VARIES_SHARE * naming.gain)
     for term in naming.fit.terms:
-        if term.interval != ALWAYS or term.effect.occasional or term.is_told:
+        if term.interval != ALWAYS or term.effect.occasional or term.effect.noisy:
             continue
         others = [t for t in naming.fit.terms if t is not term]
         without = comparison.simulate(planted(station, others))
         cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
-        cells[:, series:] = 0.0
-        cells = null.through_standing(cells)
+        cells = null.through_standing(in_series(comparison, cells))
         for length in (1, 2, 4):
             parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
             power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)

@@ -34,7 +34,7 @@ from wind_sensors.diagnosis.signatures import (
     templates_of,
     with_larger,
 )
-from wind_sensors.diagnosis.whitening import trust_of, unstanding, whitener_of
+from wind_sensors.diagnosis.whitening import in_series, trust_of, unstanding, whitener_of
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
 
@@ -202,8 +202,8 @@ class Evidence:
         probes: The catalogue's templates, then their larger sizes.
         gram: Products of the noise-whitened signatures of all probes, shape (p, p).
         seen: Products of these signatures with the residual, shape (p,).
-        inner: Products of the catalogue's signatures when every effect may stand at its least
-            size, shape (k, k).
+        common: Products of all of them with the catalogue's in the series alone, shape (p, k).
+        inner: Products of the latter when every effect may stand at its least size, shape (k, k).
         inner_seen: The same with the residual, shape (k,).
         lag: Delays that the wind's way may bring, as sums of the catalogue's signatures.
     """
@@ -211,6 +211,7 @@ class Evidence:
     probes: tuple[Template, ...]
     gram: FloatArray
     seen: FloatArray
+    common: FloatArray
     inner: FloatArray
     inner_seen: FloatArray
     lag: FloatArray
@@ -229,7 +230,7 @@ def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
     )
     trust = trust_of(comparison, bank.without, baseline)
     probed = bank.whitened(comparison, trust)
-    signatures = probed[: len(templates)]
+    signatures = in_series(comparison, probed[: len(templates)])
     residual = comparison.vector(bank.without, trust)
     least = np.array([t.smallest_standing for t in templates])
     whitener = whitener_of(comparison, trust, signatures, least)
@@ -238,6 +239,7 @@ def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
         probes=tuple(bank.templates),
         gram=probed @ probed.T,
         seen=probed @ residual,
+        common=probed @ signatures.T,
         inner=white @ white.T,
         inner_seen=white @ whitener.through_standing(residual),
         lag=lag_weights(comparison, templates),
@@ -249,10 +251,18 @@ def _bank(key: str) -> str:
 
 
 def standing_means(rows: Sequence[Evidence]) -> dict[str, float]:
-    """Amplitudes that all healthy recordings share, effects with few templates only."""
+    """Amplitudes that all healthy recordings share in their series; statistics have own means.
+
+    Of effects with few templates that are not just there or not.
+    """
+    effects = {t.key: t.effect for row in rows for t in row.probes}
     every = sorted({key for row in rows for key in row.keys})
     crowd = {key: sum(_bank(k) == _bank(key) for k in every) for key in every}
-    keys = [key for key in every if crowd[key] <= LARGEST_SHARED_BANK]
+    keys = [
+        key
+        for key in every
+        if crowd[key] <= LARGEST_SHARED_BANK and effects[key].standing > 0.0
+    ]
     place = {key: k for k, key in enumerate(keys)}
     normal = np.eye(len(keys)) / STANDING_MEAN_PRIOR**2
     right = np.zeros(len(keys))
@@ -275,9 +285,8 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
     for row in rows:
         shared = np.array([means.get(key, 0.0) for key in row.keys])
         size = len(row.keys)
-        gram = row.gram[:size, :size]
-        power = np.diag(gram)
-        rest = row.seen[:size] - gram @ shared
+        power = np.diag(row.gram)[:size]
+        rest = row.seen[:size] - row.common[:size] @ shared
         for k, key in enumerate(row.keys):
             if power[k] > 1e-3:
                 amplitudes.setdefault(key, []).append(
@@ -316,7 +325,7 @@ def loudest_gains(rows: Sequence[Evidence]) -> dict[str, float]:
         own = row.probes[: len(row.keys)]
         standing = np.array([max(sizes.get(t.key, 0.0), t.smallest_standing) for t in own])
         shared = np.array([means.get(t.key, 0.0) for t in own])
-        seen = row.seen - row.gram[:, : len(own)] @ shared
+        seen = row.seen - row.common @ shared
         usual = np.concatenate((np.diag(standing)[standing > 0.0], row.lag))
         part = usual @ row.gram[: len(own)]
         inner = np.linalg.solve(np.eye(len(usual)) + part[:, : len(own)] @ usual.T, part)

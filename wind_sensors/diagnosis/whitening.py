@@ -201,6 +201,12 @@ def _wind_parts(comparison: Comparison) -> list[FloatArray]:
             np.sin(2.0 * heading)]  # fmt: skip
 
 
+def in_series(comparison: Comparison, whitened: FloatArray) -> FloatArray:
+    """Noise-whitened differences (or rows of them) with those of the statistics left out."""
+    series = comparison.coefficients * len(comparison.channels)
+    return np.asarray(np.where(np.arange(whitened.shape[-1]) < series, whitened, 0.0))
+
+
 def unstanding(comparison: Comparison, trust: Mapping[str, Trust]) -> Whitener:
     """A whitener that knows the noise only."""
     return Whitener(comparison, trust, np.zeros((0, 0)), np.zeros(0), np.zeros(1))
@@ -221,11 +227,11 @@ def whitener_of(
         signatures: Noise-whitened signatures, one a row, shape (templates, m).
         standing: Standard deviation of each signature's amplitude on healthy days,
             shape (templates,).
-        means: Its mean, shape (templates,).
+        means: Its mean, shape (templates,); statistics have their own.
     """
-    shared: FloatArray = (
-        np.zeros(signatures.shape[1]) if means is None else np.asarray(means @ signatures)
-    )
+    shared: FloatArray = np.zeros(signatures.shape[1])
+    if means is not None:
+        shared = in_series(comparison, np.asarray(means @ signatures))
     used = standing > 0.0
     if not np.any(used):
         return Whitener(comparison, trust, np.zeros((0, 0)), np.zeros(0), shared)

@@ -29,6 +29,7 @@ from wind_sensors.diagnosis.watch.naming import candidates, limited
 from wind_sensors.diagnosis.watch.normal import Normal
 from wind_sensors.diagnosis.watch.sequential import SequentialTest
 from wind_sensors.diagnosis.watch.settings import WatchSettings
+from wind_sensors.diagnosis.whitening import in_series
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -119,6 +120,8 @@ class SumsJudge:
         signatures = bank.whitened(comparison, trust)
         raw = comparison.vector(bank.without, trust)
         standing = self._standing()[places] @ signatures
+        if self._baseline.calibrated:
+            standing = in_series(comparison, standing)
         residual = raw - standing
         gram = signatures @ signatures.T
         evidence = Evidence(
