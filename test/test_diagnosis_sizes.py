@@ -14,10 +14,11 @@ from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.decision import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Naming
+from wind_sensors.diagnosis.explanation import Judged, Naming, no_terms
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
+from wind_sensors.diagnosis.naming import explaining_what_stands_out
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.signatures import LARGER
@@ -227,3 +228,22 @@ def test_a_delay_that_grows_is_no_latency(
     gain = float(nothing @ nothing) - named.cost
     assert gain > 40.0
     assert varies(Naming(named, null, adequate, nothing, gain), STATION) is growing
+
+
+def test_of_explanations_as_good_the_one_of_what_stands_out_leads() -> None:
+    station = with_effect(STATION, catalogue()["vane_offset"], "vane", {"offset": 4.0})
+    recording = replace(recorded(station, 72), station=STATION)
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(null, searcher)
+
+    def explained(effect: str, instrument: str, **values: float) -> Judged:
+        term = Term(catalogue()[effect], instrument, values)
+        fitted = fit(null, STATION, [term], searcher.bank.without, iterations=0)
+        return Judged(fitted, null, 0.0)
+
+    slow = explained("calibration_offset", "cup", offset=-0.1)
+    turned = explained("vane_offset", "vane", offset=4.0)
+    nearly, clearly = [(24.0, slow), (20.0, turned)], [(40.0, slow), (20.0, turned)]
+    assert explaining_what_stands_out(searcher, null, nothing, nearly) == nearly[1:]
+    assert explaining_what_stands_out(searcher, null, nothing, clearly) == clearly

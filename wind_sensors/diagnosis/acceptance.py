@@ -34,7 +34,7 @@ wandering of the reference with sizes that undo each other."""
 ACCEPTED_FURTHER_GAIN = 32.0
 """The same for a second effect on the same signals."""
 
-ACCEPTED_ELSEWHERE_GAIN = 18.0
+ACCEPTED_ELSEWHERE_GAIN = 22.0
 """The same for a second effect on signals that the first does not reach."""
 
 FURTHER_SHARE = 0.1

@@ -69,8 +69,9 @@ does, in squares, if that is more than the second."""
 PARTS = 8
 VARIES = 18.0
 VARIES_SHARE = 0.02
-"""What always holds is the same in every part, half and quarter of the record: a size of its own in
-one of them must not drop the cost by more than this, or than this share of the gain."""
+"""What always holds, in a form that is certain, is the same in every part, half and quarter of the
+record: a size of its own in one of them must not drop the cost by more than this, or than this
+share of the gain."""
 
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
@@ -185,8 +186,7 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
 def varies(naming: Naming, station: Station) -> bool:
     """Whether an effect that should hold throughout has another size in a part of the record.
 
-    What acts in one sector or in lulls has other wind in every part, and what is drawn at random
-    other luck.
+    Only a form that is certain can be held to that: others depend on the wind in ways of their own.
 
     Args:
         naming: The explanation.
@@ -198,7 +198,7 @@ def varies(naming: Naming, station: Station) -> bool:
     cuts = np.linspace(0.0, comparison.grid.n * comparison.grid.dt, PARTS + 1)
     most = max(VARIES, VARIES_SHARE * naming.gain)
     for term in naming.fit.terms:
-        if term.interval != ALWAYS or term.effect.occasional or term.effect.noisy:
+        if term.interval != ALWAYS or term.effect.noisy or not term.effect.exact:
             continue
         others = [t for t in naming.fit.terms if t is not term]
         without = comparison.simulate(planted(station, others))

@@ -203,7 +203,8 @@ class Evidence:
         gram: Products of the noise-whitened signatures of all probes, shape (p, p).
         seen: Products of these signatures with the residual, shape (p,).
         common: Products of all of them with the catalogue's in the series alone, shape (p, k).
-        inner: Products of the latter when every effect may stand at its least size, shape (k, k).
+        inner: Products of the catalogue's signatures when every effect may stand at its least
+            size, shape (k, k).
         inner_seen: The same with the residual, shape (k,).
         lag: Delays that the wind's way may bring, as sums of the catalogue's signatures.
     """
@@ -251,9 +252,11 @@ def _bank(key: str) -> str:
 
 
 def standing_means(rows: Sequence[Evidence]) -> dict[str, float]:
-    """Amplitudes that all healthy recordings share in their series; statistics have own means.
+    """Amplitudes that all healthy recordings share.
 
-    Of effects with few templates that are not just there or not.
+    Of effects with few templates that are not just there or not. They are taken off the series
+    alone: statistics have means of their own, beyond which nothing is shared, and so hold those
+    effects back that would change them.
     """
     effects = {t.key: t.effect for row in rows for t in row.probes}
     every = sorted({key for row in rows for key in row.keys})

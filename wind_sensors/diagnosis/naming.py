@@ -32,6 +32,7 @@ from wind_sensors.diagnosis.explanation import (
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
+from wind_sensors.diagnosis.regions import region_bank
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.signatures import in_parallel
 from wind_sensors.diagnosis.whitening import Whitener
@@ -58,6 +59,15 @@ FAR_BEHIND = 0.8
 
 WORTH_JUDGING = 0.5
 """Share of the needed gain that a fit must bring before the noise is judged again."""
+
+AS_GOOD = 6.0
+"""Explanations bring as much if they differ by less, three in log-likelihood."""
+
+STANDS_OUT = 0.05
+"""Probability, on a healthy day, of the strongest region below which it asks for an explanation."""
+
+EXPLAINED = 0.5
+"""Share of the region's score below which what is left is no more than its noise."""
 
 WORTH_ANOTHER_TURN = 14.0
 """Largest linear score below which no further effect is looked for."""
@@ -139,8 +149,40 @@ def _leader(
     if not enough:
         return None
     enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough)]
+    enough = explaining_what_stands_out(searcher, whitener, current, enough)
     most = max(brings for brings, _ in enough)
     return next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
+
+
+def explaining_what_stands_out(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    enough: list[tuple[float, Judged]],
+) -> list[tuple[float, Judged]]:
+    """Of explanations that bring as much as the best, those of the region that stands out.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        enough: What each brings, and the explanation.
+    """
+    most = max(brings for brings, _ in enough)
+    near = [pair for pair in enough if pair[0] > most - AS_GOOD]
+    if len({one.fit.terms[-1].key for _, one in near}) < 2:
+        return enough
+    bank = region_bank(whitener, searcher.bank.without)
+    before = bank.scores(current.vector)
+    strongest = int(np.argmax(before))
+    if bank.p_value(float(before[strongest])) > STANDS_OUT:
+        return enough
+
+    def left(one: Judged) -> float:
+        return float(bank.scores(whitener.of(one.fit.simulated))[strongest])
+
+    explaining = [p for p in near if left(p[1]) < EXPLAINED * float(before[strongest])]
+    return explaining or enough
 
 
 def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -> bool:
