@@ -72,7 +72,7 @@ def draw_doses(doses: Sequence[Dose], path: Path) -> None:
     """Chance of a find against size, one panel for each curve, counts with their intervals."""
     columns = min(4, len(doses))
     lines = -(-len(doses) // columns)
-    figure = Figure(figsize=(2.7 * columns, 2.2 * lines))
+    figure = Figure(figsize=(0.8 + 3.2 * columns, 0.6 + 2.2 * lines), layout="constrained")
     size = np.geomspace(0.4, 8.0, 80)
     for i, dose in enumerate(doses):
         axes = figure.add_subplot(lines, columns, i + 1)
