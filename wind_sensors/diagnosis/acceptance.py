@@ -110,9 +110,8 @@ def brought(
     In its own null alone a flexible effect gains from the noise that it has fitted away. What one
     event in the record brings does not count.
     """
-    if not plausible(candidate.fit) or is_a_way_of_the_wind(
-        searcher.comparison, candidate.fit.terms[-1]
-    ):
+    newest = candidate.fit.terms[-1]
+    if not is_plausible(newest) or is_a_way_of_the_wind(searcher.comparison, newest):
         return -np.inf
     whitener = candidate.whitener
     before = (

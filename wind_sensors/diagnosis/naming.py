@@ -29,6 +29,7 @@ from wind_sensors.diagnosis.explanation import (
     seen_in,
     total,
 )
+from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
@@ -59,9 +60,6 @@ FAR_BEHIND = 0.8
 
 WORTH_JUDGING = 0.5
 """Share of the needed gain that a fit must bring before the noise is judged again."""
-
-AS_GOOD = 6.0
-"""Explanations bring as much if they differ by less, three in log-likelihood."""
 
 STANDS_OUT = 0.05
 """Probability, on a healthy day, of the strongest region below which it asks for an explanation."""
@@ -169,7 +167,7 @@ def explaining_what_stands_out(
         enough: What each brings, and the explanation.
     """
     most = max(brings for brings, _ in enough)
-    near = [pair for pair in enough if pair[0] > most - AS_GOOD]
+    near = [pair for pair in enough if pair[0] > most - 2.0 * EQUAL_LIKELIHOOD]
     if len({one.fit.terms[-1].key for _, one in near}) < 2:
         return enough
     bank = region_bank(whitener, searcher.bank.without)
