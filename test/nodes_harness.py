@@ -37,6 +37,7 @@ class Graph:
         self._contexts: list[Context] = []
         self._executors: list[Any] = []
         self._nodes: list[Any] = []
+        self._resting: set[int] = set()
 
     def add(self, make: Callable[..., Any], **options: Any) -> Any:
         """Make a node in a new participant; options go to `make` together with `context`."""
@@ -61,6 +62,10 @@ class Graph:
         node.create_subscription(message_type, topic, got.append, quality)
         return got
 
+    def rest(self, node: Any) -> None:
+        """Let a node do nothing more; what it has published still arrives."""
+        self._resting.add(self._nodes.index(node))
+
     def spin(self, until: Callable[[], bool], at_most: float = 20.0) -> None:
         """Spin everything until the condition holds.
 
@@ -70,7 +75,9 @@ class Graph:
         end = time.monotonic() + at_most
         while not until():
             assert time.monotonic() < end, "what the test waits for never happened"
-            for executor in self._executors:
+            for index, executor in enumerate(self._executors):
+                if index in self._resting:
+                    continue
                 for _ in range(_BATCH):
                     executor.spin_once(timeout_sec=0.0)
             time.sleep(0.0005)

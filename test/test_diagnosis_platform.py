@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 
+from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.learning import learn
@@ -42,8 +44,14 @@ def flown(station: Station, seed: int) -> Recording:
     return replace(recording, station=uav(), truth=None)
 
 
+@lru_cache(maxsize=1)
+def three_flights() -> Baseline:
+    """What three healthy flights teach."""
+    return learn([flown(uav(), seed) for seed in range(3)])
+
+
 def test_a_flight_tells_the_inflow_of_its_rotors() -> None:
-    baseline = learn([flown(uav(), seed) for seed in range(3)])
+    baseline = three_flights()
     found = diagnose(flown(uav(induced_velocity=2.0, wake_skew=0.3), 50), baseline)
     assert found.verdict == "named"
     (finding,) = found.findings
@@ -72,7 +80,7 @@ def test_an_effect_adds_to_what_a_station_already_states() -> None:
 
 
 def test_a_log_that_dies_is_found_with_its_end() -> None:
-    known = learn([flown(uav(), seed) for seed in range(3)])
+    known = three_flights()
     flight = flown(uav(), 51)
     assert flight.platform is not None
     since = (flight.platform.time - flight.start) * 1e-9
@@ -86,7 +94,7 @@ def test_a_log_that_dies_is_found_with_its_end() -> None:
 
 
 def test_a_dead_log_is_found_and_replaced_by_the_positions() -> None:
-    known = learn([flown(uav(), seed) for seed in range(3)])
+    known = three_flights()
     flight = flown(uav(), 51)
     assert flight.platform is not None
     still = np.zeros_like(flight.platform.velocity)

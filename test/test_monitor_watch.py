@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from representatives import represented
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
@@ -73,7 +74,9 @@ def test_healthy_hours_raise_no_alarm() -> None:
     assert not watch.past
 
 
-@pytest.mark.parametrize("name", sorted(PLANTED))
+@pytest.mark.parametrize(
+    "name", represented(PLANTED, by=("vane_friction", "missed_pulses", "bearing_friction"))
+)
 def test_an_effect_is_found_within_minutes_and_named_among_the_candidates(name: str) -> None:
     instrument, values = PLANTED[name]
     effect = catalogue()[name]

@@ -26,6 +26,10 @@ EQUAL_SHARE = 0.03
 """Explanations that differ by less than this share of the gain are equal: the simulation is not
 exact enough to tell them apart."""
 
+CLEARLY_BETTER = 12.0
+"""Drop of the penalised cost at which two effects take the place of another explanation, and which
+an explanation must not miss to compete with another."""
+
 
 def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
     """What parameters and intervals cost; a term's second parameter costs more than its first."""

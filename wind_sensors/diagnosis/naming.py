@@ -19,6 +19,7 @@ from wind_sensors.diagnosis.acceptance import (
 )
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import (
+    CLEARLY_BETTER,
     EQUAL_SHARE,
     Alternative,
     Judged,
@@ -33,6 +34,7 @@ from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.moves import merged, pruned, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
+from wind_sensors.diagnosis.pairs import better_pair
 from wind_sensors.diagnosis.regions import region_bank
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.signatures import in_parallel
@@ -46,10 +48,6 @@ need fewer parameters."""
 
 BROAD_PARAMETERS = 3
 """From so many fitted parameters on, an explanation with a broad effect is challenged."""
-
-CLEARLY_BETTER = 12.0
-"""Drop of the penalised cost at which two narrow effects take the place of a broad one, and which
-an explanation must not miss to compete with another."""
 
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
@@ -76,8 +74,9 @@ def name(
 ) -> Naming:
     """Find the effects that explain the recording.
 
-    An effect of the whole station may stand in for two of single instruments. Where it needs the
-    help of others, the search runs once more without such effects, and the better one counts.
+    Effects are added one by one; then two simple ones may take the place of all. An effect of the
+    whole station may stand in for two of single instruments. Where it needs the help of others, the
+    search runs once more without such effects, and the better one counts.
 
     Args:
         searcher: Prepared search.
@@ -86,6 +85,12 @@ def name(
     whitener = searcher.whitener(searcher.bank.without)
     singles = _single_fits(searcher, whitener)
     found = _greedy(searcher, progress, whitener, singles, frozenset())
+    if found.fit.terms and not any(term.is_told for term in found.fit.terms):
+        pair = better_pair(searcher, whitener, singles, found.fit)
+        if pair is not None:
+            both = pruned(searcher, pair.whitener, pair.fit)
+            if len(both.terms) > 1:
+                return _settled(searcher, *swapped(searcher, pair.whitener, both), found.screened)
     broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
     if not broad or found.fit.active < BROAD_PARAMETERS:
         return found
@@ -367,7 +372,27 @@ def _greedy(
             current, alternatives = swapped(searcher, whitener, current)
         else:
             alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
-    current = _without_implausible(searcher, whitener, current)
+    if progress:
+        progress(1.0)
+    return _settled(searcher, current, alternatives, screened)
+
+
+def _settled(
+    searcher: Searcher,
+    current: Fit,
+    alternatives: tuple[Alternative, ...],
+    screened: tuple[tuple[str, str, float], ...],
+) -> Naming:
+    """An explanation in the null that it leaves, with its beginnings and ends.
+
+    Args:
+        searcher: The search.
+        current: The explanation.
+        alternatives: Those that lost.
+        screened: Best scores of the first screening.
+    """
+    whitener = searcher.whitener(current.simulated)
+    current = _without_implausible(searcher, whitener, seen_in(whitener, current))
     if current.terms:
         current = with_interval(searcher, current)
         whitener = searcher.whitener(current.simulated)
@@ -379,8 +404,6 @@ def _greedy(
         current = replace(
             current, covariance=covariance_of(adequate, searcher.station, current)
         )
-    if progress:
-        progress(1.0)
     return Naming(
         current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
         alternatives, screened,

@@ -64,7 +64,7 @@ class Updater:
         hardware_id: str = "",
     ) -> None:
         self._node = node
-        self._sources = [*sources, self._clock_status]
+        self._sources = [*sources, self._simulated_time]
         self._hardware_id = hardware_id
         self._publisher = advertise(node, DiagnosticArray, "/diagnostics", output_quality())
         self._timer = node.create_timer(
@@ -90,16 +90,16 @@ class Updater:
                 )
         self._publisher.publish(array)
 
-    def _clock_status(self) -> Iterable[Status]:
+    def _simulated_time(self) -> Iterable[Status]:
         if not self._node.get_parameter("use_sim_time").value:
             return
         if self._node.get_clock().now().nanoseconds > 0:
             self._periods_without_time = 0
-            yield Status("clock", Level.OK, "Simulated time is running.")
+            yield Status("simulated time", Level.OK, "Simulated time is running.")
             return
         self._periods_without_time += 1
         yield Status(
-            "clock",
+            "simulated time",
             Level.ERROR if self._periods_without_time > 1 else Level.WARN,
             "use_sim_time is set but nothing arrives on /clock: start the bag with its clock "
             "(`wind replay`, `ros2 bag play --clock`) or set use_sim_time to false.",

@@ -1,0 +1,50 @@
+"""Two effects on the same signals, which one with more parameters imitates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import Term, planted
+from wind_sensors.diagnosis.pairs import promise
+from wind_sensors.diagnosis.verdict import diagnose
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 10_000), several=st.integers(1, 3))
+def test_a_promise_is_the_drop_of_the_sum_of_squares(seed: int, several: int) -> None:
+    rng = np.random.default_rng(seed)
+    changes = rng.standard_normal((5, 40))
+    vector = 3.0 * changes[0] - changes[2] + rng.standard_normal(40)
+    members = [0, 2, 4][:several]
+    drop, multiples = promise(changes @ changes.T, changes @ vector, members)
+    left = vector - multiples @ changes[members]
+    assert drop == pytest.approx(vector @ vector - left @ left)
+    (solved, *_) = np.linalg.lstsq(changes[members].T, vector, rcond=None)
+    assert multiples == pytest.approx(solved)
+
+
+def test_what_does_the_same_as_another_promises_nothing_more() -> None:
+    change = np.linspace(-1.0, 1.0, 50)
+    vector = change + 0.1 * np.cos(np.arange(50.0))
+    changes = np.array([change, 2.0 * change])
+    gram, seen = changes @ changes.T, changes @ vector
+    assert promise(gram, seen, [0, 1])[0] == pytest.approx(promise(gram, seen, [0])[0])
+
+
+def test_a_heavy_rotor_in_a_bad_bearing_is_not_called_iced() -> None:
+    """Ice makes a rotor slower and heavier with two numbers of one effect."""
+    effects = catalogue()
+    friction = {"friction_speed": 1.4, "temperature_coefficient": 0.0, "breakaway": 1.0}
+    terms = [
+        Term(effects["rotor_inertia"], "cup", {"inertia_factor": 2.5}),
+        Term(effects["bearing_friction"], "cup", friction),
+    ]
+    found = diagnose(recorded(planted(STATION, terms), 68), baseline(), with_proof=False)
+    named = {f.term.effect.name for f in found.findings}
+    assert {"rotor_inertia", "bearing_friction"} <= named
+    assert "icing" not in named

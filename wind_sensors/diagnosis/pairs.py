@@ -1,0 +1,134 @@
+"""Pairs of effects: put together from what single effects explain, neither of which leads alone.
+
+Adding the best effect and then the next goes astray where two simple effects move the same signals:
+one effect with many parameters imitates both better than either of them does.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.acceptance import (
+    ACCEPTED_FURTHER_GAIN,
+    is_plausible,
+    large_enough,
+    may_join,
+    plausible,
+)
+from wind_sensors.diagnosis.explanation import (
+    CLEARLY_BETTER,
+    EQUAL_SHARE,
+    Judged,
+    judged,
+    no_terms,
+    parameter_cost,
+    total,
+)
+from wind_sensors.diagnosis.fitting import Fit, Term
+from wind_sensors.diagnosis.search import Searcher
+from wind_sensors.diagnosis.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
+
+FITTED_PAIRS = 3
+"""So many of the most promising pairs are fitted."""
+
+SMALLEST_SHARE = 0.3
+LARGEST_SHARE = 2.5
+"""Beside another effect, one has this part of its size alone, at least and at most."""
+
+
+def better_pair(
+    searcher: Searcher, whitener: Whitener, singles: Sequence[Fit], current: Fit
+) -> Judged | None:
+    """Two effects that explain clearly more than what leads, without it; None: there are none.
+
+    Args:
+        searcher: The search.
+        whitener: The null in which `singles` were fitted.
+        singles: Fits of single effects.
+        current: What leads.
+    """
+    leading = {term.key for term in current.terms}
+    pairs = [
+        terms
+        for terms in promising_pairs(searcher, whitener, singles, current)
+        if not leading & {term.key for term in terms}
+    ][:FITTED_PAIRS]
+    if not pairs:
+        return None
+    leader, *_ = judged(searcher, [current])
+    fits = searcher.refit_all(leader.whitener, pairs)
+    sound = [f for f in fits if all(is_plausible(t) and large_enough(t) for t in f.terms)]
+    ranked = [r for r in judged(searcher, sound) if plausible(r.fit)]
+    if not ranked:
+        return None
+    best = ranked[0]
+    gain = total(no_terms(leader.whitener, searcher)) - total(leader.fit)
+    margin = max(CLEARLY_BETTER, EQUAL_SHARE * gain)
+    if best.fit.active > leader.fit.active:
+        margin = max(ACCEPTED_FURTHER_GAIN, margin)
+    return best if best.evidence < leader.evidence - margin else None
+
+
+def promising_pairs(
+    searcher: Searcher, whitener: Whitener, singles: Sequence[Fit], current: Fit
+) -> list[list[Term]]:
+    """Pairs whose fits together, each scaled, promise more than what leads; best first.
+
+    Args:
+        searcher: The search.
+        whitener: The null in which `singles` were fitted.
+        singles: Fits of single effects.
+        current: What leads.
+    """
+    nothing = whitener.of(searcher.bank.without)
+    best: dict[tuple[str, str], Fit] = {}
+    for one in singles:
+        key = one.terms[0].key
+        if key not in best or total(one) < total(best[key]):
+            best[key] = one
+    kept = list(best.values())
+    explained = [*(one.simulated for one in kept), current.simulated]
+    changes = nothing - np.array([whitener.of(simulated) for simulated in explained])
+    gram, seen = changes @ changes.T, changes @ nothing
+    led, _ = promise(gram, seen, [len(kept)])
+    promised = led - parameter_cost(current.terms, current.active)
+    found: list[tuple[float, list[Term]]] = []
+    for i, j in itertools.combinations(range(len(kept)), 2):
+        terms = [kept[i].terms[0], kept[j].terms[0]]
+        if not may_join(terms[1], terms[:1]):
+            continue
+        gain, sizes = promise(gram, seen, [i, j])
+        gain -= parameter_cost(terms, kept[i].active + kept[j].active)
+        if gain > promised + CLEARLY_BETTER:
+            scaled = [_scaled(t, float(s)) for t, s in zip(terms, sizes, strict=True)]
+            found.append((gain, scaled))
+    return [terms for _, terms in sorted(found, key=lambda pair: -pair[0])]
+
+
+def promise(
+    gram: FloatArray, seen: FloatArray, members: list[int]
+) -> tuple[float, FloatArray]:
+    """Drop of the cost by the best multiples of some changes, and those multiples.
+
+    Args:
+        gram: Products of the changes with each other.
+        seen: Products of the changes with what is to be explained.
+        members: Which changes.
+    """
+    multiples = np.linalg.pinv(gram[np.ix_(members, members)], rcond=1e-4) @ seen[members]
+    return float(multiples @ seen[members]), np.asarray(multiples)
+
+
+def _scaled(term: Term, share: float) -> Term:
+    """A term with a part of its size; what the signals tell stays as told."""
+    if term.is_told or term.effect.legible:
+        return term
+    values = term.effect.scaled(term.values, float(np.clip(share, SMALLEST_SHARE, LARGEST_SHARE)))
+    return replace(term, values=values)
