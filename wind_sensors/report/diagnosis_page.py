@@ -30,7 +30,7 @@ code,.eq{font-family:ui-monospace,monospace;font-size:.92em;overflow-wrap:anywhe
 .eq{display:block;background:#f2f5f7;border-radius:6px;padding:.5rem .7rem;margin:.4rem 0}
 table{border-collapse:collapse;width:100%;font-size:.95rem}
 th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
-td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .scroll{overflow-x:auto}svg{max-width:100%;height:auto}
 .bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
 .bar i{display:block;height:100%;background:var(--blue)}
@@ -123,7 +123,8 @@ def _physics(finding: Finding) -> str:
         f"<section><h2>The physics: {escape(words(effect.name))}</h2>"
         f"<span class='eq'>{escape(effect.equation)}</span>"
         f"<p class='muted'>{escape(effect.source)}. It shows in: {escape(effect.region)}.</p>"
-        f"<div class='scroll'><table><tr><th>parameter</th><th>value</th><th>95 % interval</th>"
+        f"<div class='scroll'><table><tr><th>parameter</th><th class='n'>value</th>"
+        f"<th class='n'>95 % interval</th>"
         f"<th>unit</th></tr>{rows}</table></div>"
         f"<p>The mismatch is largest in <b>{escape(region.label)}</b> ({escape(region.channel)}): "
         f"{number_text(finding.located.excess)} {escape(finding.located.unit)}; "
@@ -209,7 +210,7 @@ def _left(diagnosis: Diagnosis) -> str:
     return (
         "<section><h2>What is left</h2>"
         f"<p>p = {unexplained.p:.3g} for the largest remainder.</p><div class='scroll'><table>"
-        "<tr><th>channel</th><th>where</th><th>residual</th><th>score</th></tr>"
+        "<tr><th>channel</th><th>where</th><th class='n'>residual</th><th class='n'>score</th></tr>"
         f"{rows}</table></div></section>"
     )
 
@@ -224,7 +225,7 @@ def _detectable(diagnosis: Diagnosis) -> str:
     )
     return (
         "<section><details><summary>The smallest size of each effect that this recording could "
-        "have shown</summary><div class='scroll'><table><tr><th>effect</th><th>size</th>"
+        "have shown</summary><div class='scroll'><table><tr><th>effect</th><th class='n'>size</th>"
         f"<th>meaning</th></tr>{rows}</table></div></details></section>"
     )
 
