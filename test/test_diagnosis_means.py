@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from representatives import represented
 
 from wind_sensors.diagnosis.counts import compare_pair, count_statistics
 from wind_sensors.diagnosis.fitting import ALWAYS
@@ -350,7 +351,7 @@ def _stiff_in_the_cold(wind: FloatArray, temperature: FloatArray) -> FloatArray:
     return np.asarray(y)
 
 
-@pytest.mark.parametrize("stiff", [True, False])
+@pytest.mark.parametrize("stiff", represented([True, False], by=(True,)))
 def test_friction_follows_the_temperature_only_where_held_out_blocks_say_so(stiff: bool) -> None:
     station, time, values = made(13)
     _, _, before = made(113)

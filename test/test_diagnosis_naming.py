@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from representatives import represented
 from scipy.signal import lfilter
 
 from wind_sensors.diagnosis.baseline import Baseline
@@ -91,6 +92,7 @@ def baseline() -> Baseline:
     return learn([recorded(STATION, seed) for seed in range(4)])
 
 
+@lru_cache(maxsize=4)
 def diagnosed(effect: str, instrument: str, seed: int = 50, **values: float) -> Diagnosis:
     station = with_effect(STATION, catalogue()[effect], instrument, values)
     return diagnose(recorded(station, seed), baseline())
@@ -101,19 +103,20 @@ def test_nothing_is_named_on_a_healthy_day(seed: int) -> None:
     assert diagnose(recorded(STATION, seed), baseline()).verdict == "none"
 
 
+PLANTED = {
+    "calibration_drift": ("cup", "gain", 0.94),
+    "rotor_inertia": ("cup", "inertia_factor", 3.0),
+    "vane_offset": ("vane", "offset", 6.0),
+    "vane_friction": ("vane", "friction_speed", 2.5),
+    "timestamp_latency": ("vane", "latency", 0.8),
+}
+
+
 @pytest.mark.parametrize(
-    ("effect", "instrument", "parameter", "value"),
-    [
-        ("calibration_drift", "cup", "gain", 0.94),
-        ("rotor_inertia", "cup", "inertia_factor", 3.0),
-        ("vane_offset", "vane", "offset", 6.0),
-        ("vane_friction", "vane", "friction_speed", 2.5),
-        ("timestamp_latency", "vane", "latency", 0.8),
-    ],
+    "effect", represented(PLANTED, by=("calibration_drift", "rotor_inertia", "vane_friction"))
 )
-def test_a_planted_effect_gets_its_name_and_its_size(
-    effect: str, instrument: str, parameter: str, value: float
-) -> None:
+def test_a_planted_effect_gets_its_name_and_its_size(effect: str) -> None:
+    instrument, parameter, value = PLANTED[effect]
     found = diagnosed(effect, instrument, **{parameter: value})
     assert found.verdict == "named"
     assert [f.term.key for f in found.findings] == [(effect, instrument)]

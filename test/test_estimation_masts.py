@@ -18,7 +18,7 @@ WHOLE = EstimatorSettings(window=900.0)
 
 
 @pytest.mark.parametrize(
-    "name", represented(MASTS, by=("station-a/healthy-4", "station-c/healthy-3"))
+    "name", represented(MASTS, by=("station-a/healthy-2", "station-c/healthy-3"))
 )
 def test_means_direction_and_coverage(name: str) -> None:
     found = agreement(process(shared_recording(name), WHOLE))

@@ -75,7 +75,7 @@ def test_healthy_hours_raise_no_alarm() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", represented(PLANTED, by=("vane_friction", "missed_pulses", "bearing_friction"))
+    "name", represented(PLANTED, by=("vane_friction", "missed_pulses"))
 )
 def test_an_effect_is_found_within_minutes_and_named_among_the_candidates(name: str) -> None:
     instrument, values = PLANTED[name]
