@@ -50,6 +50,24 @@ def _kernel_folder(package: Path) -> str:
     return ""
 
 
+def _package_of(function: Callable[..., Any]) -> Path:
+    """Folder of the package that a function belongs to."""
+    depth = function.__module__.count(".")
+    return Path(function.__code__.co_filename).resolve().parents[max(depth - 1, 0)]
+
+
+def is_kept(kernel: Callable[..., Any]) -> bool:
+    """Whether an earlier run has compiled a kernel, so that its first call need not wait.
+
+    Args:
+        kernel: Made by `compiled`.
+    """
+    function = cast(Any, kernel).py_func
+    file = Path(function.__code__.co_filename).stem
+    folder = _kernel_folder(_package_of(function))
+    return folder != "" and any(Path(folder).rglob(f"{file}.{function.__qualname__}-*.nbi"))
+
+
 def compiled(function: _Function) -> _Function:
     """Compile a numeric kernel to machine code, keeping its type signature.
 
@@ -57,11 +75,9 @@ def compiled(function: _Function) -> _Function:
     for the compilation. Floating-point semantics stay strict (no reassociation), because the same
     input must give the same bits live and offline.
     """
-    depth = function.__module__.count(".")
-    package = Path(function.__code__.co_filename).resolve().parents[max(depth - 1, 0)]
     settings: Any = numba.config
     before = settings.CACHE_DIR
-    settings.CACHE_DIR = _kernel_folder(package)
+    settings.CACHE_DIR = _kernel_folder(_package_of(function))
     try:
         return cast(_Function, numba.njit(cache=True, error_model="numpy")(function))
     finally:

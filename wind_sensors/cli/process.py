@@ -18,6 +18,7 @@ from wind_sensors.estimation import (
     HealthLevel,
     ProcessedRecording,
     WindowStatistics,
+    must_compile,
     process,
 )
 from wind_sensors.estimation.constants import measures_vertical
@@ -96,6 +97,8 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.output).exists() and not args.force:
         clear_target(Path(args.output), force=False)
     console = Console(stderr=True)
+    if must_compile(settings):
+        console.print("Compiling the estimator, once after an installation: about a minute.")
     with Progress(
         TextColumn("estimating the wind"),
         BarColumn(),

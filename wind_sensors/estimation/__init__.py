@@ -10,7 +10,7 @@ from wind_sensors.estimation.outputs import (
 )
 from wind_sensors.estimation.processing import process
 from wind_sensors.estimation.settings import METHODS, EstimatorSettings, Method
-from wind_sensors.estimation.streaming import StreamingEstimator, make_estimator
+from wind_sensors.estimation.streaming import StreamingEstimator, make_estimator, must_compile
 
 __all__ = [
     "METHODS",
@@ -24,5 +24,6 @@ __all__ = [
     "WindEstimate",
     "WindowStatistics",
     "make_estimator",
+    "must_compile",
     "process",
 ]

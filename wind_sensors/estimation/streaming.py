@@ -10,6 +10,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.compiled import is_kept
 from wind_sensors.errors import UserError
 from wind_sensors.estimation.array_methods import InverseArrayCore, NaiveArrayCore
 from wind_sensors.estimation.bivane_sampling import sampling_health
@@ -33,6 +34,7 @@ from wind_sensors.estimation.intake import (
 )
 from wind_sensors.estimation.inverse import InverseCore
 from wind_sensors.estimation.kalman import KalmanCore
+from wind_sensors.estimation.kalman_kernel import run
 from wind_sensors.estimation.naive import NaiveCore
 from wind_sensors.estimation.outputs import HealthItem, WindEstimate, WindowStatistics
 from wind_sensors.estimation.settings import EstimatorSettings
@@ -352,6 +354,11 @@ class StreamingEstimator:
         if self._latest is not None:
             items.append(bias_health(self._latest))
         return items
+
+
+def must_compile(settings: EstimatorSettings) -> bool:
+    """Whether the first estimate waits for about a minute, as once after an installation."""
+    return settings.method == "kalman" and not is_kept(run)
 
 
 def make_estimator(

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.utilities import remove_ros_args
 
 from wind_sensors.errors import UserError
-from wind_sensors.estimation import EstimatorSettings, make_estimator
+from wind_sensors.estimation import EstimatorSettings, make_estimator, must_compile
 from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.estimator_parameters import NODE_PARAMETERS
@@ -90,6 +90,11 @@ class EstimatorNode(Node):
         self._show_effective_values(instruments)
         settings = self._settings(self._values)
         self._estimator = make_estimator(self.station, settings)
+        if must_compile(settings):
+            self.get_logger().info(
+                "Compiling the estimator; this happens once after an installation and takes about "
+                "a minute."
+            )
         warm_up(self.station, settings)
         self._inputs = EstimatorInputs(self.station, self._estimator, self._now)
         self._outputs = WindPublishers(self, self.station.platform)
