@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import borne_out, determined, made_up
+from wind_sensors.diagnosis.decision import borne_out, determined, made_up, passes_unseen
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
@@ -206,6 +206,25 @@ def test_a_name_needs_a_size_that_is_not_nought(low: float, high: float, known: 
     # What is there or is not has no size to determine.
     swapped = _finding("sensor_swap", "vane", 0.9, 0.002)
     assert determined((swapped,))
+
+
+@pytest.mark.parametrize(
+    ("effect", "interval", "p", "unseen"),
+    [
+        (OFFSET, (300.0, 600.0), 0.4, True),
+        (OFFSET, (300.0, 600.0), 0.002, False),
+        (OFFSET, ALWAYS, 0.4, False),
+        (("stuck_sensor", "vane"), (300.0, 600.0), 0.4, False),
+    ],
+)
+def test_what_begins_or_ends_must_stand_out(
+    effect: tuple[str, str], interval: tuple[float, float | None], p: float, unseen: bool
+) -> None:
+    found = _finding(*effect, 0.9, p)
+    passing = replace(found, term=replace(found.term, interval=interval))
+    assert passes_unseen((passing,)) is unseen
+    # A rival in an ambiguous set needs no place of its own.
+    assert not passes_unseen((replace(passing, proof=None),))
 
 
 def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:

@@ -228,6 +228,20 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     return together and sum(f.share for f in own) > MOST_SHARED
 
 
+def passes_unseen(findings: tuple[Finding, ...]) -> bool:
+    """Whether something is said to begin or end inside the record that stands out nowhere.
+
+    Of the many intervals some fit the swings of a healthy vane.
+    """
+    return any(
+        f.term.interval != ALWAYS
+        and not f.term.effect.legible
+        and f.proof is not None
+        and f.p > REMAINDER_P
+        for f in findings
+    )
+
+
 def borne_out(findings: tuple[Finding, ...]) -> bool:
     """Whether blocks that were not fitted speak for the findings.
 

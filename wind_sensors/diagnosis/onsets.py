@@ -226,7 +226,7 @@ def _best_window(
         span = _best_span(gains, SHORTEST_WINDOW)
         return None if span is None else span.window
     allowed = np.isin(cuts, first)[:, None] & np.isin(cuts, last)[None, :]
-    allowed &= cuts[None, :] - cuts[:, None] > 0.5 * step
+    allowed &= cuts[None, :] - cuts[:, None] >= SHORTEST_WINDOW
     if not allowed.any():
         return None
     net = np.where(allowed, gains.gains, -np.inf)

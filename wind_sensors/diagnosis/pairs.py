@@ -29,7 +29,7 @@ from wind_sensors.diagnosis.explanation import (
     parameter_cost,
     total,
 )
-from wind_sensors.diagnosis.fitting import Fit, Term
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
@@ -81,6 +81,8 @@ def promising_pairs(
 ) -> list[list[Term]]:
     """Pairs whose fits together, each scaled, promise more than what leads; best first.
 
+    Only of effects that always hold: two of which one passes imitate any form of one that does not.
+
     Args:
         searcher: The search.
         whitener: The null in which `singles` were fitted.
@@ -90,6 +92,8 @@ def promising_pairs(
     nothing = whitener.of(searcher.bank.without)
     best: dict[tuple[str, str], Fit] = {}
     for one in singles:
+        if one.terms[0].interval != ALWAYS:
+            continue
         key = one.terms[0].key
         if key not in best or total(one) < total(best[key]):
             best[key] = one

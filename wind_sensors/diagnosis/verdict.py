@@ -19,6 +19,7 @@ from wind_sensors.diagnosis.decision import (
     determined,
     is_noisy,
     made_up,
+    passes_unseen,
     remainder_of,
     stands_out,
     undo_each_other,
@@ -190,8 +191,12 @@ def diagnose(
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
-    refuted = findings and not borne_out(findings)
-    if refuted:
+    objection = ""
+    if not borne_out(findings):
+        objection = "blocks that were not fitted do not bear it out"
+    elif passes_unseen(findings):
+        objection = "only for a part of the record, where nothing stands out"
+    if objection:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
         verdict, findings = ("unknown" if stands_out(findings) else "none"), ()
     made = (
@@ -213,8 +218,8 @@ def diagnose(
         description = f"{description}; {described(excess)}"
     if calm:
         description = too_calm(baseline)
-    if refuted:
-        objection = f"{refuted_names} would fit, but blocks that were not fitted do not bear it out"
+    if objection:
+        objection = f"{refuted_names} would fit, but {objection}"
         description = f"{description}; {objection}" if description else objection
     return Diagnosis(
         recording=recording.name,
