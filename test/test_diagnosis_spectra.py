@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from wind_sensors.diagnosis import spectra
@@ -22,13 +20,6 @@ def test_cosine_transform_is_orthonormal() -> None:
     coefficients = spectra.to_cosine(series)
     assert np.sum(coefficients**2) == pytest.approx(np.sum(series**2))
     assert spectra.from_cosine(coefficients) == pytest.approx(series)
-
-
-@given(n=st.integers(1, 20_000))
-def test_a_length_is_shortened_by_a_hundredth_at_most_and_only_for_small_factors(n: int) -> None:
-    shorter = spectra.fast_length(n)
-    assert n - n / 100.0 <= shorter <= n
-    assert shorter == n or 210**20 % shorter == 0
 
 
 def test_bands_cover_every_coefficient_once() -> None:

@@ -404,8 +404,7 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
             recording.name,
             f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
         )
-    bins = spectra.fast_length(int(seconds / SERIES_INTERVAL))
-    grid = Grid(drive.start_ns, SERIES_INTERVAL, bins)
+    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
     channels = tuple(
         c
         for c in channels_of(known)

@@ -32,21 +32,6 @@ def from_cosine(coefficients: FloatArray) -> FloatArray:
     return np.asarray(idct(coefficients, type=2, norm="ortho", axis=-1), dtype=np.float64)
 
 
-def fast_length(n: int) -> int:
-    """The largest number up to n without prime factors above 7; n if that is a hundredth smaller.
-
-    Of a prime length the transform takes five times as long.
-    """
-    for shorter in range(n, n - n // 100, -1):
-        left = shorter
-        for factor in (2, 3, 5, 7):
-            while left % factor == 0:
-                left //= factor
-        if left == 1:
-            return shorter
-    return n
-
-
 def cosine_frequencies(n: int, dt: float) -> FloatArray:
     """Frequencies of the n coefficients [Hz]."""
     return np.arange(n) / (2.0 * n * dt)
