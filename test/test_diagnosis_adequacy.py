@@ -10,7 +10,13 @@ from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import borne_out, determined, made_up, passes_unseen
+from wind_sensors.diagnosis.decision import (
+    borne_out,
+    determined,
+    is_uneven,
+    made_up,
+    passes_unseen,
+)
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
@@ -44,6 +50,31 @@ def test_an_effect_of_another_form_keeps_its_name() -> None:
     rank = np.argsort(np.argsort(speed)) / speed.size
     found = diagnose(_with_readings(recording, np.radians(8.0) * (0.95 + 0.1 * rank)), baseline())
     assert [f.term.effect.name for f in found.findings] == ["vane_offset"]
+
+
+def _slewed(recording: Recording, fastest: float) -> Recording:
+    """The recording with a vane whose reading turns no faster than so much [rad/s]."""
+    angles = recording.angles["vane"]
+    shown = angles.angle.copy()
+    for k in range(1, shown.size):
+        step = np.angle(np.exp(1j * (angles.angle[k] - shown[k - 1])))
+        most = fastest * (angles.time[k] - angles.time[k - 1]) * 1e-9
+        shown[k] = shown[k - 1] + np.clip(step, -most, most)
+    wrapped = np.angle(np.exp(1j * shown))
+    return replace(recording, angles={"vane": Angles(angles.time, wrapped)})
+
+
+def test_what_refuses_fast_turns_is_no_filter_for_it_leaves_slow_ones_alone() -> None:
+    filtered = with_effect(
+        STATION, catalogue()["low_pass_filter"], "vane", {"time_constant": 1.0}
+    )
+    for recording, uneven in (
+        (recorded(filtered, 62), False),
+        (_slewed(recorded(STATION, 62), np.radians(10.0)), True),
+    ):
+        naming = diagnose(recording, baseline(), with_proof=False).naming
+        assert naming.fit.terms
+        assert is_uneven(naming, STATION) is uneven
 
 
 def test_what_no_effect_describes_is_unknown() -> None:
@@ -222,9 +253,10 @@ def test_what_begins_or_ends_must_stand_out(
 ) -> None:
     found = _finding(*effect, 0.9, p)
     passing = replace(found, term=replace(found.term, interval=interval))
-    assert passes_unseen((passing,)) is unseen
+    assert passes_unseen((passing,), 60.0) is unseen
+    assert not passes_unseen((passing,), 600.0)
     # A rival in an ambiguous set needs no place of its own.
-    assert not passes_unseen((replace(passing, proof=None),))
+    assert not passes_unseen((replace(passing, proof=None),), 60.0)
 
 
 def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
             baseline = learnt(options.healthy, options.station, recording.station, progress)
         task = progress.add_task("comparing", total=1.0)
         baseline = baseline.for_station(recording.station)
-        comparison = prepare(recording, baseline.station)
+        comparison = prepare(recording, baseline.station, baseline.place)
         searcher = searcher_of(
             comparison, baseline, catalogue(), {},
             progress=lambda share: progress.update(task, completed=0.8 * share),

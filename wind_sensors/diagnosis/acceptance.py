@@ -31,6 +31,9 @@ PASSING_FORM_GAIN = 60.0
 """The same with several parameters: in a few minutes of wind from a few directions they fit many a
 wandering of the reference with sizes that undo each other."""
 
+MANY_FORMS = 3
+"""So many fitted parameters count as several, whatever their sizes mean."""
+
 ACCEPTED_FURTHER_GAIN = 32.0
 """The same for a second effect on the same signals."""
 
@@ -96,8 +99,10 @@ def passing_gain(term: Term) -> float:
     """Gain that a term has to bring for its beginning or end inside the record; else nothing."""
     if term.interval == ALWAYS or term.effect.legible:
         return 0.0
-    graded = sum(p.healthy is not None and p.minimum > 0.0 for p in term.effect.parameters)
-    if graded > 1:
+    effect = term.effect
+    graded = sum(p.healthy is not None and p.minimum > 0.0 for p in effect.parameters)
+    fitted = sum(p.value_from == "fit" for p in effect.parameters)
+    if graded > 1 or (fitted >= MANY_FORMS and not effect.occasional):
         return PASSING_FORM_GAIN
     return PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN
 

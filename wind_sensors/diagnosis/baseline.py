@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STEPS, STILLNESS, Channel
+from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -92,6 +93,7 @@ class Baseline:
             (or of the `station`, the `platform`) promises in one healthy recording judged by the
             others.
         usual_wind: Wind speed [m/s] that healthy recordings exceed nearly all the time.
+        place: Where the reference stands; None: unknown.
     """
 
     recordings: tuple[str, ...]
@@ -102,6 +104,7 @@ class Baseline:
     standing: Mapping[str, float] = field(default_factory=dict)
     loudest: Mapping[str, float] = field(default_factory=dict)
     usual_wind: float = np.inf
+    place: Place | None = None
 
     @property
     def calibrated(self) -> bool:
@@ -126,6 +129,7 @@ class Baseline:
             station.instruments == self.original.instruments
             and station.platform == self.original.platform
             and station.changes == self.original.changes
+            and station.reference == self.original.reference
         )
         if same:
             return self
@@ -136,7 +140,10 @@ class Baseline:
             for entry in station.instruments
         )
         return replace(
-            self, original=station, station=station.model_copy(update={"instruments": entries})
+            self,
+            original=station,
+            station=station.model_copy(update={"instruments": entries}),
+            place=self.place if station.reference == self.original.reference else None,
         )
 
     def to_json(self) -> str:
@@ -153,6 +160,7 @@ class Baseline:
             "standing": dict(self.standing),
             "loudest": dict(self.loudest),
             "usual_wind": _listed(np.array([self.usual_wind]))[0],
+            "place": None if self.place is None else asdict(self.place),
         }
         return json.dumps(content, indent=1)
 
@@ -177,6 +185,7 @@ class Baseline:
                 standing=content["standing"],
                 loudest=content["loudest"],
                 usual_wind=float(_unlisted([content["usual_wind"]])[0]),
+                place=None if content.get("place") is None else Place(**content["place"]),
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem

@@ -8,7 +8,7 @@ whitened differences, measured minus simulated, in which a healthy station gives
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -32,6 +32,7 @@ from wind_sensors.diagnosis.observation import (
     step_statistics,
     stillness_statistics,
 )
+from wind_sensors.diagnosis.reference_place import Place, delayed
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import wrap
 from wind_sensors.simulation.drive import Drive, drive_from_recording
@@ -132,6 +133,7 @@ class Comparison:
         expected: Simulated deviation of each vane from `direction` [rad], by channel name.
             Deviations are counted on the turn that lies nearest to it, so that a vane which
             swings through the opposite direction does not jump by a turn in one series only.
+        place: Where the reference stands; None: unknown.
         memory: What instruments did in `drive`; None: nothing is kept.
     """
 
@@ -146,6 +148,7 @@ class Comparison:
     measured: Simulated
     mask: FloatArray | None = None
     expected: Mapping[str, FloatArray] = field(default_factory=dict)
+    place: Place | None = None
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
     _simulated: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
@@ -156,6 +159,16 @@ class Comparison:
         masked = replace(self, mask=self.masked(mask))
         measured = masked.observe(self.recording.pulses, self.recording.angles)
         return replace(masked, measured=measured)
+
+    def where_vanes_follow(self, explanations: Iterable[Simulated]) -> FloatArray:
+        """Weights that are zero while a vane and one of its simulations turn round apart, (n,)."""
+        vanes = [c.name for c in self.channels if c.kind == "vane_angle"]
+        apart = (
+            self.masked(self.measured.series[v] - simulated.series[v]) / self.speed
+            for simulated in explanations
+            for v in vanes
+        )
+        return where_vanes_follow(apart, self.grid)
 
     @property
     def coefficients(self) -> int:
@@ -385,12 +398,15 @@ class Comparison:
         return out
 
 
-def prepare(recording: Recording, station: Station | None = None) -> Comparison:
+def prepare(
+    recording: Recording, station: Station | None = None, place: Place | None = None
+) -> Comparison:
     """Prepare a recording for comparison.
 
     Args:
         recording: With a reference wind.
         station: Station to compare with; None: the recording's own.
+        place: Where the reference stands; None: unknown, its wind counts as that at the sensors.
 
     Raises:
         UserError: There is no reference, or too little of anything.
@@ -416,7 +432,11 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
             recording.name,
             "Check the topics in the station file with `wind info`.",
         )
-    flow = WindAtSensors(known, drive).flow(known.instrument(channels[0].instrument)).wind
+    first = known.instrument(channels[0].instrument)
+    flow = WindAtSensors(known, drive).flow(first).wind
+    if place is not None:
+        drive = delayed(drive, flow, place)
+        flow = WindAtSensors(known, drive).flow(first).wind
     at = np.arange(len(drive)) * drive.dt
     coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
     speed = np.hypot(flow[:, 0], flow[:, 1])
@@ -439,6 +459,7 @@ def prepare(recording: Recording, station: Station | None = None) -> Comparison:
         speed=np.maximum(slow_speed, 0.5),
         wind_from=np.interp(grid.centres, at, coming_from),
         measured=empty,
+        place=place,
         memory=DriveMemory(drive),
     )
     comparison = replace(comparison, expected=_expected(comparison))

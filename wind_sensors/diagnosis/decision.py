@@ -8,7 +8,9 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
 
+from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
@@ -73,6 +75,15 @@ VARIES_SHARE = 0.02
 record: a size of its own in one of them must not drop the cost by more than this, or than this
 share of the gain."""
 
+LIVELY_TIME = 5.0
+"""A signal is lively or quiet by how fast it moves within so many seconds."""
+
+UNEVEN = 9.0
+UNEVEN_SHARE = 0.005
+"""An effect has one size, whether its signal is lively or quiet: another one in lively moments must
+not drop the cost by more than this, or than this share of the gain. What refuses jumps, or sticks
+and slips in its own way, is taken for a filter or for friction otherwise."""
+
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
 nothing up or down."""
@@ -81,6 +92,10 @@ MOST_FREE_PARAMETERS = 2
 CERTAIN_GAIN = 50.0
 """An explanation with more parameters that brings less than this must also stand out somewhere in
 the data."""
+
+UNSEEN_GAIN = 200.0
+"""What begins or ends inside the record and brings more need not stand out in a region: what
+changes the quick part of a signal moves none up or down."""
 
 TOO_BLUNT = 6.0
 """A record that shows no effect below this many smallest sizes is inconclusive."""
@@ -212,6 +227,58 @@ def varies(naming: Naming, station: Station) -> bool:
     return False
 
 
+def unevenness(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if an effect had one size while its signals are lively, another while not.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: One of its effects.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    others = [t for t in naming.fit.terms if t is not term]
+    without = comparison.simulate(planted(station, others))
+    n = comparison.coefficients
+    halves = np.zeros((2, n * len(comparison.channels)))
+    for k, channel in enumerate(comparison.channels):
+        name = channel.name
+        change = naming.fit.simulated.series[name] - without.series[name]
+        if not np.any(change):
+            continue
+        trust = null.trust[name]
+        lively = _lively(without.series[name], comparison.grid.dt)
+        for half, weight in zip(halves, (1.0 - lively, lively), strict=True):
+            part = spectra.to_cosine(comparison.masked(change * weight))[:n]
+            half[k * n : (k + 1) * n] = trust.slope / trust.deviation * part
+    left = null.of(naming.fit.simulated)
+    padded = np.pad(halves, ((0, 0), (0, left.size - halves.shape[1])))
+    parts = null.through_standing(padded)
+    quiet, lively_power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1e-9)
+    sizes = parts @ left / np.array([quiet, lively_power])
+    return float((sizes[1] - sizes[0]) ** 2 / (1.0 / quiet + 1.0 / lively_power))
+
+
+def _lively(series: FloatArray, dt: float) -> FloatArray:
+    """Weights from nought where a series is quiet to one where it is lively, shape (n,)."""
+    moving = uniform_filter1d(np.gradient(series) ** 2, round(LIVELY_TIME / dt), mode="nearest")
+    rank = np.argsort(np.argsort(moving)) / max(series.size - 1, 1)
+    return np.asarray(np.clip(2.0 * rank - 0.5, 0.0, 1.0))
+
+
+def is_uneven(naming: Naming, station: Station) -> bool:
+    """Whether an effect has another size while its signals are lively than while they are quiet.
+
+    Those whose form is certain are held to one size in all parts of the record instead.
+    """
+    most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
+    return any(
+        unevenness(naming, station, term) > most
+        for term in naming.fit.terms
+        if not term.effect.exact and not term.effect.legible and not term.is_told
+    )
+
+
 def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
@@ -228,12 +295,16 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     return together and sum(f.share for f in own) > MOST_SHARED
 
 
-def passes_unseen(findings: tuple[Finding, ...]) -> bool:
+def passes_unseen(findings: tuple[Finding, ...], gain: float) -> bool:
     """Whether something is said to begin or end inside the record that stands out nowhere.
 
-    Of the many intervals some fit the swings of a healthy vane.
+    Of the many intervals some fit the swings of a healthy vane; but none brings much.
+
+    Args:
+        findings: What is said.
+        gain: Drop of the cost by all of it.
     """
-    return any(
+    return gain < UNSEEN_GAIN and any(
         f.term.interval != ALWAYS
         and not f.term.effect.legible
         and f.proof is not None

@@ -2,7 +2,8 @@
 
 It takes up to separation / speed, less when it comes from aside. That is common to all channels,
 but not all of them follow the same eddies; and it changes while the wind turns, which looks like a
-clock that drifts.
+clock that drifts. Where healthy recordings told the reference's place, only what is uncertain of it
+is left.
 """
 
 from __future__ import annotations
@@ -26,10 +27,14 @@ DETOUR = 1.5
 """Delays are up to so many times longer than the way at that speed."""
 
 COMMON_LAG = 0.5
-"""Standard deviation of the common delay, in separations over the wind's speed."""
+"""Standard deviation of the common delay, in separations over the wind's speed, where nobody knows
+the reference's place."""
 
 SINGLE_LAG = 0.25
 """The same of what a channel adds of its own, and of the change within half a record."""
+
+SURELY = 2.0
+"""Standard deviations that a delay may be long for the wind's way from a known place."""
 
 
 def lag_weights(comparison: Comparison, templates: Sequence[Template]) -> FloatArray:
@@ -43,7 +48,10 @@ def lag_weights(comparison: Comparison, templates: Sequence[Template]) -> FloatA
         Shape (k, templates): the delay and the drift common to all channels, and the delay of each;
         no rows for a reference at the same place.
     """
-    delay = _separation(comparison) / float(np.mean(comparison.speed))
+    speed = float(np.mean(comparison.speed))
+    delay = _separation(comparison) / speed
+    place = comparison.place
+    together = COMMON_LAG * delay if place is None else place.error / speed
     half = 0.5 * comparison.grid.n * comparison.grid.dt
     common, drifting = np.zeros((2, len(templates)))
     rows = []
@@ -51,13 +59,13 @@ def lag_weights(comparison: Comparison, templates: Sequence[Template]) -> FloatA
         if template.number != 0 or template.multiple != 1.0 or template.instrument == STATION:
             continue
         if template.effect.name == "timestamp_latency":
-            one = delay / template.values["latency"]
-            common[k] = COMMON_LAG * one
+            common[k] = together / template.values["latency"]
             row = np.zeros(len(templates))
-            row[k] = SINGLE_LAG * one
+            row[k] = SINGLE_LAG * delay / template.values["latency"]
             rows.append(row)
         elif template.effect.name == "clock_drift":
-            drifting[k] = SINGLE_LAG * 1e6 * delay / half / template.values["drift"]
+            turning = min(SINGLE_LAG * delay, together)
+            drifting[k] = 1e6 * turning / half / template.values["drift"]
     found = np.array([common, drifting, *rows])
     return np.asarray(found[np.any(found, axis=1)])
 
@@ -68,7 +76,11 @@ def is_a_way_of_the_wind(comparison: Comparison, term: Term) -> bool:
     A drift may come from delays of either sign at the record's ends.
     """
     slow = float(np.quantile(comparison.speed, SLOW_WIND))
+    place = comparison.place
     way = DETOUR * _separation(comparison) / slow
+    if place is not None:
+        uncertain = np.hypot(place.error, SINGLE_LAG * _separation(comparison))
+        way = min(way, SURELY * float(uncertain) / slow)
     if term.effect.name == "timestamp_latency":
         return abs(term.values["latency"]) < way
     if term.effect.name == "clock_drift":

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.decision import (
     borne_out,
     determined,
     is_noisy,
+    is_uneven,
     made_up,
     passes_unseen,
     remainder_of,
@@ -132,6 +133,25 @@ def smallest_detectable(
     return out
 
 
+def _explained(
+    comparison: Comparison,
+    baseline: Baseline,
+    effects: Mapping[str, Effect],
+    workers: int,
+    report: Callable[[str], Callable[[float], None]],
+) -> tuple[Searcher, Naming]:
+    """The explanation of a recording, and the search that found it."""
+    guesses = {
+        key: terms
+        for key, terms in guesses_of(comparison, baseline.station).items()
+        if key[0] in effects
+    }
+    searcher = searcher_of(
+        comparison, baseline, effects, guesses, workers, report("simulating the catalogue")
+    )
+    return searcher, name(searcher, report("fitting effects"))
+
+
 def diagnose(
     recording: Recording,
     baseline: Baseline,
@@ -159,15 +179,13 @@ def diagnose(
         return lambda share: progress(phase, share) if progress else None
 
     baseline = baseline.for_station(recording.station)
-    comparison = prepare(recording, baseline.station)
-    guesses = {
-        key: terms for key, terms in guesses_of(comparison, baseline.station).items()
-        if key[0] in known
-    }  # fmt: skip
-    searcher = searcher_of(
-        comparison, baseline, known, guesses, workers, report("simulating the catalogue")
-    )
-    naming = name(searcher, report("fitting effects"))
+    comparison = prepare(recording, baseline.station, baseline.place)
+    searcher, naming = _explained(comparison, baseline, known, workers, report)
+    rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
+    follows = comparison.where_vanes_follow(rivals if naming.fit.terms else [])
+    if np.any(comparison.masked(1.0 - follows) > 0.5):
+        comparison = comparison.within(follows)
+        searcher, naming = _explained(comparison, baseline, known, workers, report)
     whitener = naming.whitener
     bank = region_bank(whitener, searcher.bank.without)
     report("locating")(0.5)
@@ -194,7 +212,7 @@ def diagnose(
     objection = ""
     if not borne_out(findings):
         objection = "blocks that were not fitted do not bear it out"
-    elif passes_unseen(findings):
+    elif passes_unseen(findings, naming.gain):
         objection = "only for a part of the record, where nothing stands out"
     if objection:
         refuted_names = ", ".join(f.term.effect.name for f in findings)
@@ -203,6 +221,7 @@ def diagnose(
         made_up(findings, comparison)
         or undo_each_other(naming, baseline.station)
         or varies(naming, baseline.station)
+        or is_uneven(naming, baseline.station)
     )
     if findings and (made or not determined(findings)):
         verdict, findings = "unknown", ()

@@ -257,8 +257,9 @@ class Watch:
         if recording.reference.time.size < _LEAST_SEEN * (stop - start) / GRID_STEP:
             self._skip("too little wind to compare with")
             return None
+        place = self._baseline.place if self.settings.drive == "reference" else None
         try:
-            comparison = prepare(recording, self.station)
+            comparison = prepare(recording, self.station, place)
         except UserError as problem:
             self._skip(str(problem))
             return None
