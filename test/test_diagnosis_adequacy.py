@@ -122,6 +122,21 @@ def test_a_vane_that_turned_round_the_other_way_says_nothing(
         assert diagnose(_with_readings(recording, away), baseline()).verdict == "none"
 
 
+def test_seconds_in_which_one_explanation_turns_round_hold_its_misfit() -> None:
+    comparison = prepare(recorded(STATION, 64))
+    right = comparison.simulate(STATION)
+    name = "vane/vane_angle"
+    moment = (comparison.grid.centres > 100.0) & (comparison.grid.centres < 105.0)
+    turned = right.series[name] + np.pi * comparison.speed * moment
+    rival = replace(right, series={**right.series, name: turned})
+    assert comparison.where_vanes_follow([right]).min() == 1.0
+    follows = comparison.where_vanes_follow([right, rival])
+    assert not follows[moment].any()
+    assert follows[comparison.grid.centres > 112.0].min() == 1.0
+    assert comparison.misfit_outside(follows, rival) > 0.9
+    assert comparison.misfit_outside(follows, right) < 0.1
+
+
 def test_the_form_of_no_change_is_no_signature() -> None:
     comparison = prepare(recorded(STATION, 64))
     simulated = comparison.simulate(STATION)

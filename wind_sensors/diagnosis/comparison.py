@@ -170,6 +170,16 @@ class Comparison:
         )
         return where_vanes_follow(apart, self.grid)
 
+    def misfit_outside(self, weights: FloatArray, simulated: Simulated) -> float:
+        """Largest share of a vane's squared misfit that lies where weights are small."""
+        shares = [0.0]
+        for channel in self.channels:
+            if channel.kind == "vane_angle":
+                name = channel.name
+                misfit = self.masked(self.measured.series[name] - simulated.series[name]) ** 2
+                shares.append(float(np.sum(misfit * (1.0 - weights)) / max(misfit.sum(), 1e-12)))
+        return max(shares)
+
     @property
     def coefficients(self) -> int:
         """Number of cosine coefficients compared in each channel."""

@@ -45,6 +45,11 @@ from wind_sensors.station.signals import Recording
 
 FloatArray = npt.NDArray[np.float64]
 
+TURNING_MISFIT = 0.1
+"""The search runs again without the seconds in which vanes turn round apart if these hold this
+share of a vane's misfit."""
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """Everything that is said about one recording.
@@ -181,11 +186,12 @@ def diagnose(
     baseline = baseline.for_station(recording.station)
     comparison = prepare(recording, baseline.station, baseline.place)
     searcher, naming = _explained(comparison, baseline, known, workers, report)
-    rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
-    follows = comparison.where_vanes_follow(rivals if naming.fit.terms else [])
-    if np.any(comparison.masked(1.0 - follows) > 0.5):
-        comparison = comparison.within(follows)
-        searcher, naming = _explained(comparison, baseline, known, workers, report)
+    if naming.fit.terms:
+        rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
+        follows = comparison.where_vanes_follow(rivals)
+        if comparison.misfit_outside(follows, naming.fit.simulated) > TURNING_MISFIT:
+            comparison = comparison.within(follows)
+            searcher, naming = _explained(comparison, baseline, known, workers, report)
     whitener = naming.whitener
     bank = region_bank(whitener, searcher.bank.without)
     report("locating")(0.5)
