@@ -78,7 +78,7 @@ share of the gain."""
 LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
 
-UNEVEN = 9.0
+UNEVEN = 12.0
 UNEVEN_SHARE = 0.005
 """An effect has one size, whether its signal is lively or quiet: another one in lively moments must
 not drop the cost by more than this, or than this share of the gain. What refuses jumps, or sticks
