@@ -77,6 +77,12 @@ def test_healthy_days_tell_where_the_reference_stands() -> None:
         assert abs(found - true) < 2.0 * place.error + 0.1
 
 
+def test_delays_that_do_not_follow_the_wind_tell_no_place() -> None:
+    station = days()[0].station
+    beside = [replace(recorded(STATION, seed), station=station) for seed in (3, 4, 5, 6)]
+    assert located(beside, default_baseline(station)) is None
+
+
 def test_a_reference_at_the_sensors_has_no_place_to_learn() -> None:
     reference = STATION.reference
     assert reference is not None
@@ -105,7 +111,7 @@ def test_a_known_place_makes_the_comparison_closer_and_delays_telling() -> None:
 
 
 def test_a_baseline_keeps_the_place_until_the_reference_moves() -> None:
-    baseline = learn(days()[:2])
+    baseline = learn(days())
     assert baseline.place is not None
     again = Baseline.from_json(baseline.to_json())
     assert again.place == baseline.place

@@ -60,6 +60,10 @@ PLACE_STEP = 0.2
 LATENCY_STEP = 0.05
 """Steps of the reference's place [m] and of a delay [s] for differences."""
 
+SURE_OF_PLACE = 4.0
+"""Standard deviations that a place must lie away from the instruments to be believed: beside a
+reference that stands across the wind delays come and go without following its direction."""
+
 LATENCY_SCATTER = 0.02
 LATENCY_PRIOR = 0.05
 """Delays of a healthy channel [s], from day to day and altogether: the rotor of a certificate
@@ -205,7 +209,7 @@ def _commissioned(
 
 
 def located(recordings: Sequence[Recording], baseline: Baseline) -> Place | None:
-    """Where the reference stands, from the delays of healthy recordings; None: at the sensors.
+    """Where the reference stands, from the delays of healthy recordings; None: they do not tell.
 
     A delay that does not change with the wind's direction is the instrument's own.
 
@@ -251,7 +255,7 @@ def located(recordings: Sequence[Recording], baseline: Baseline) -> Place | None
         solved, covariance = pooled(seen, scatter, prior)
         error = float(np.sqrt(np.max(np.linalg.eigvalsh(covariance[:2, :2]))))
         place = Place(float(solved[0]), float(solved[1]), error)
-    return place
+    return place if np.hypot(place.x, place.y) > SURE_OF_PLACE * place.error else None
 
 
 @dataclass(frozen=True)
