@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, recorded
 
+from wind_sensors.cli.baseline import told_place
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
@@ -75,6 +76,11 @@ def test_healthy_days_tell_where_the_reference_stands() -> None:
     assert place.error < 0.5 * AWAY
     for found, true in zip((place.x, place.y), STANDS, strict=True):
         assert abs(found - true) < 2.0 * place.error + 0.1
+
+
+def test_people_are_told_the_place_with_its_error() -> None:
+    told = told_place(Place(0.506, -0.628, 0.118))
+    assert "0.51 m along the sensors' x and -0.63 m along their y (± 0.12 m)" in told
 
 
 def test_delays_that_do_not_follow_the_wind_tell_no_place() -> None:

@@ -12,6 +12,7 @@ from rich.progress import Progress
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.learning import default_baseline, learn
+from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.station.model import Station
@@ -98,4 +99,15 @@ def run(options: argparse.Namespace) -> int:
     options.output.parent.mkdir(parents=True, exist_ok=True)
     options.output.write_text(baseline.to_json() + "\n", encoding="utf-8")
     print(f"wrote {options.output} from {len(baseline.recordings)} healthy recordings")
+    if baseline.place is not None:
+        print(told_place(baseline.place))
     return 0
+
+
+def told_place(place: Place) -> str:
+    """Where healthy delays say that the reference stands, for people."""
+    return (
+        "delays tell that the reference stands "
+        f"{place.x:.2f} m along the sensors' x and {place.y:.2f} m along their y "
+        f"(± {place.error:.2f} m) from the instruments"
+    )
