@@ -254,9 +254,9 @@ def unevenness(naming: Naming, station: Station, term: Term) -> float:
     left = null.of(naming.fit.simulated)
     padded = np.pad(halves, ((0, 0), (0, left.size - halves.shape[1])))
     parts = null.through_standing(padded)
-    quiet, lively_power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1e-9)
-    sizes = parts @ left / np.array([quiet, lively_power])
-    return float((sizes[1] - sizes[0]) ** 2 / (1.0 / quiet + 1.0 / lively_power))
+    power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1e-9)
+    sizes = parts @ left / power
+    return float((sizes[1] - sizes[0]) ** 2 / np.sum(1.0 / power))
 
 
 def _lively(series: FloatArray, dt: float) -> FloatArray:
