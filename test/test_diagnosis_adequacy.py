@@ -248,10 +248,16 @@ def test_what_acts_seldom_cannot_be_asked_of_every_block(
 @pytest.mark.parametrize(("low", "high", "known"), [(0.1, 0.5, True), (-0.5, 0.9, False)])
 def test_a_name_needs_a_size_that_is_not_nought(low: float, high: float, known: bool) -> None:
     offset = {"offset": Estimate(0.3, low, high, "m/s")}
-    assert determined((replace(_finding(*OFFSET, 0.9, 0.002), parameters=offset),)) is known
+    found = replace(_finding(*OFFSET, 0.9, 0.002), parameters=offset)
+    small, large = (
+        replace(found, term=replace(found.term, values={"offset": size})) for size in (0.1, 0.5)
+    )
+    # Where only a product of two parameters shows, neither interval is narrow.
+    for one, gain, enough in ((large, 40.0, known), (small, 400.0, known), (large, 400.0, True)):
+        assert determined((one,), gain) is enough
     # What is there or is not has no size to determine.
     swapped = _finding("sensor_swap", "vane", 0.9, 0.002)
-    assert determined((swapped,))
+    assert determined((swapped,), 40.0)
 
 
 @pytest.mark.parametrize(

@@ -97,6 +97,11 @@ UNSEEN_GAIN = 200.0
 """What begins or ends inside the record and brings more need not stand out in a region: what
 changes the quick part of a signal moves none up or down."""
 
+SURE_GAIN = 100.0
+SURE_SIZE = 3.0
+"""What brings so much and is so many of the smallest sizes worth reporting is there, whatever the
+intervals of its parameters say."""
+
 TOO_BLUNT = 6.0
 """A record that shows no effect below this many smallest sizes is inconclusive."""
 
@@ -327,9 +332,21 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     return seldom and stands_out(findings) and proof.excess_removed >= rival
 
 
-def determined(findings: tuple[Finding, ...]) -> bool:
-    """Whether the data tell, of every effect named, at least one size that is not nought."""
-    return all(_has_a_size(f) for f in findings if f.proof is not None)
+def determined(findings: tuple[Finding, ...], gain: float) -> bool:
+    """Whether the data tell, of every effect named, at least one size that is not nought.
+
+    Of a vane out of balance on a mast at rest they tell the product with the lean, so that neither
+    has a narrow interval; what brings much and is large is not nought for all that.
+
+    Args:
+        findings: What is said.
+        gain: Drop of the cost by all of it.
+    """
+    return all(
+        _has_a_size(f) or (f.share * gain > SURE_GAIN and f.term.relative_size > SURE_SIZE)
+        for f in findings
+        if f.proof is not None
+    )
 
 
 def _has_a_size(finding: Finding) -> bool:

@@ -229,7 +229,7 @@ def diagnose(
         or varies(naming, baseline.station)
         or is_uneven(naming, baseline.station)
     )
-    if findings and (made or not determined(findings)):
+    if findings and (made or not determined(findings, naming.gain)):
         verdict, findings = "unknown", ()
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
