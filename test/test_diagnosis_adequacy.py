@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.acceptance import PASSING_FORM_GAIN, PASSING_GAIN, passing_gain
 from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.decision import (
     borne_out,
@@ -258,6 +259,24 @@ def test_a_name_needs_a_size_that_is_not_nought(low: float, high: float, known: 
     # What is there or is not has no size to determine.
     swapped = _finding("sensor_swap", "vane", 0.9, 0.002)
     assert determined((swapped,), 40.0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "instrument", "needed"),
+    [
+        ("calibration_drift", "cup", PASSING_GAIN),
+        ("bearing_friction", "cup", PASSING_GAIN),
+        ("wake_shadow", "cup", PASSING_GAIN),
+        ("vane_imbalance", "vane", PASSING_FORM_GAIN),
+        ("axis_tilt", "station", PASSING_FORM_GAIN),
+    ],
+)
+def test_what_passes_in_many_forms_must_bring_more(
+    effect: str, instrument: str, needed: float
+) -> None:
+    passing = Term(catalogue()[effect], instrument, {}, (100.0, 200.0))
+    assert passing_gain(passing) == needed
+    assert passing_gain(replace(passing, interval=ALWAYS)) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,8 @@ PASSING_FORM_GAIN = 60.0
 wandering of the reference with sizes that undo each other."""
 
 MANY_FORMS = 3
-"""So many fitted parameters count as several, whatever their sizes mean."""
+"""So many fitted parameters that have a healthy value count as several, whichever of them says how
+large the effect is: a lean makes of an imbalance what the wind's wandering needs."""
 
 ACCEPTED_FURTHER_GAIN = 32.0
 """The same for a second effect on the same signals."""
@@ -101,8 +102,8 @@ def passing_gain(term: Term) -> float:
         return 0.0
     effect = term.effect
     graded = sum(p.healthy is not None and p.minimum > 0.0 for p in effect.parameters)
-    fitted = sum(p.value_from == "fit" for p in effect.parameters)
-    if graded > 1 or (fitted >= MANY_FORMS and not effect.occasional):
+    shaping = sum(p.healthy is not None and p.value_from == "fit" for p in effect.parameters)
+    if graded > 1 or shaping >= MANY_FORMS:
         return PASSING_FORM_GAIN
     return PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN
 
