@@ -16,10 +16,11 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import Term
-from wind_sensors.diagnosis.learning import default_baseline, learn, located
+from wind_sensors.diagnosis.learning import default_baseline, learn
 from wind_sensors.diagnosis.reference_lag import is_a_way_of_the_wind
-from wind_sensors.diagnosis.reference_place import Place, delayed, pooled
-from wind_sensors.simulation.drive import Drive, drive_from_recording
+from wind_sensors.diagnosis.reference_place import Place, delayed
+from wind_sensors.diagnosis.reference_search import located, pooled
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.signals import Recording
 
 AWAY = 3.0
@@ -150,10 +151,3 @@ def test_witnesses_that_agree_are_believed(
     one, alone = pooled(seen[:1], scatter, prior)
     assert one == pytest.approx(truth, abs=1e-3)
     assert np.trace(covariance) < np.trace(alone)
-
-
-def test_the_drive_of_a_recording_is_that_of_its_reference() -> None:
-    recording = recorded(STATION, 9)
-    assert recording.reference is not None
-    drive = drive_from_recording(recording)
-    assert np.array_equal(drive.wind, recording.reference.velocity[: len(drive)])

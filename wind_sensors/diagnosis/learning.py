@@ -21,8 +21,8 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, with_effect
 from wind_sensors.diagnosis.noise_level import learnt_levels, levels
 from wind_sensors.diagnosis.observation import channels_of
-from wind_sensors.diagnosis.reference_lag import SINGLE_LAG, lag_weights
-from wind_sensors.diagnosis.reference_place import Place, pooled
+from wind_sensors.diagnosis.reference_lag import lag_weights
+from wind_sensors.diagnosis.reference_search import located
 from wind_sensors.diagnosis.screening import is_possible, scores_of
 from wind_sensors.diagnosis.search import (
     PENALTY_PER_FURTHER_PARAMETER,
@@ -55,19 +55,6 @@ _STANDING_FACTOR = 1.3
 
 STANDING_MEAN_PRIOR = 0.7
 """Prior deviation of the shared amplitudes, in templates."""
-
-PLACE_STEP = 0.2
-LATENCY_STEP = 0.05
-"""Steps of the reference's place [m] and of a delay [s] for differences."""
-
-SURE_OF_PLACE = 4.0
-"""Standard deviations that a place must lie away from the instruments to be believed: beside a
-reference that stands across the wind delays come and go without following its direction."""
-
-LATENCY_SCATTER = 0.02
-LATENCY_PRIOR = 0.05
-"""Delays of a healthy channel [s], from day to day and altogether: the rotor of a certificate
-answers a little sooner or later than the real one."""
 
 SELDOM = 0.1
 """Winds below this quantile are too rare in healthy recordings to say what is normal."""
@@ -206,56 +193,6 @@ def _commissioned(
             values = {parameter: healthy + tolerance * float(amplitude)}
             current = with_effect(current, effect, name, values)
     return current
-
-
-def located(recordings: Sequence[Recording], baseline: Baseline) -> Place | None:
-    """Where the reference stands, from the delays of healthy recordings; None: they do not tell.
-
-    A delay that does not change with the wind's direction is the instrument's own.
-
-    Args:
-        recordings: Healthy recordings.
-        baseline: Knows their channels' noise.
-    """
-    station = baseline.station
-    if station.reference is None or station.reference.separation <= 0.0:
-        return None
-    separation = station.reference.separation
-    names = [c.name for c in channels_of(station)]
-    latency = catalogue()["timestamp_latency"]
-    own = np.full(len(names), 1.0)
-    scatter = np.concatenate((np.full(2, SINGLE_LAG * separation), LATENCY_SCATTER * own))
-    prior = np.concatenate((np.full(2, np.sqrt(0.5) * separation), LATENCY_PRIOR * own))
-    place = Place(0.0, 0.0, float(prior[0]))
-    for _ in range(2):
-        here = np.concatenate(([place.x, place.y], np.zeros(len(names))))
-        seen = []
-        for recording in recordings:
-            comparison = prepare(recording, station, place)
-            without = comparison.simulate(station)
-            trust = trust_of(comparison, without, baseline)
-            size = comparison.coefficients * len(comparison.channels)
-            nothing = comparison.vector(without, trust)[:size]
-            rows = np.zeros((prior.size, size))
-            for k, (dx, dy) in enumerate(((PLACE_STEP, 0.0), (0.0, PLACE_STEP))):
-                moved = prepare(
-                    recording, station, replace(place, x=place.x + dx, y=place.y + dy)
-                )
-                white = moved.vector(moved.simulate(station), trust)[:size]
-                rows[k] = (nothing - white) / PLACE_STEP
-            for channel in comparison.channels:
-                late = with_effect(
-                    station, latency, channel.instrument, {"latency": LATENCY_STEP}
-                )
-                only = comparison.affected(station, channel.instrument)
-                white = comparison.vector(comparison.simulate(late, only, without), trust)[:size]
-                rows[2 + names.index(channel.name)] += (nothing - white) / LATENCY_STEP
-            information = rows @ rows.T
-            seen.append((information, rows @ nothing + information @ here))
-        solved, covariance = pooled(seen, scatter, prior)
-        error = float(np.sqrt(np.max(np.linalg.eigvalsh(covariance[:2, :2]))))
-        place = Place(float(solved[0]), float(solved[1]), error)
-    return place if np.hypot(place.x, place.y) > SURE_OF_PLACE * place.error else None
 
 
 @dataclass(frozen=True)

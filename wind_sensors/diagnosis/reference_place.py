@@ -6,7 +6,6 @@ Eddies travel with the wind. A reference that stands upwind of the instruments s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,29 +53,3 @@ def delayed(drive: Drive, flow: FloatArray, place: Place) -> Drive:
     at = np.arange(len(drive)) * drive.dt
     shown = np.clip(at - later, at[0], at[-1])
     return drive.with_wind(np.asarray(CubicSpline(at, drive.wind)(shown)))
-
-
-def pooled(
-    seen: Sequence[tuple[FloatArray, FloatArray]], scatter: FloatArray, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """One vector from several witnesses, each of which scatters beyond its own error.
-
-    Args:
-        seen: Of each witness: the normal matrix, shape (k, k), and its product with what the
-            witness says, shape (k,).
-        scatter: Standard deviation of what witnesses say, shape (k,).
-        prior: Standard deviation about nought of the vector, shape (k,).
-
-    Returns:
-        The vector, shape (k,), and its covariance, shape (k, k).
-    """
-    least = 1e-6 * np.eye(prior.size)
-    normal, right = np.diag(prior**-2.0), np.zeros(prior.size)
-    for information, product in seen:
-        estimate = np.linalg.solve(information + least, product)
-        weight = np.linalg.inv(np.linalg.inv(information + least) + np.diag(scatter**2))
-        normal += weight
-        right += weight @ estimate
-    covariance = np.linalg.inv(normal)
-    solved: FloatArray = np.asarray(covariance @ right, dtype=np.float64)
-    return solved, np.asarray(covariance, dtype=np.float64)
