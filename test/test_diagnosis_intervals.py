@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparison import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.intervals import interval_gains
+from wind_sensors.diagnosis.onsets import refined_interval
+from wind_sensors.diagnosis.search import searcher_of
 
 CELLS = 7
 LENGTH = 40
@@ -33,3 +39,17 @@ def test_gains_are_those_of_least_squares(seed: int, number: int) -> None:
             assert best.gains[i, j] == pytest.approx(alone)
             assert np.count_nonzero(best.amplitudes[i, j]) == 1
     assert not np.any(np.tril(joint.gains))
+
+
+def test_what_cannot_hold_all_the_time_keeps_its_interval() -> None:
+    # A cup whose torque grows with its rate runs away in the lulls of this wind, not for a minute.
+    comparison = prepare(recorded(STATION, 9, mean=3.0))
+    asymmetry = catalogue()["torque_asymmetry"]
+    passing = Term(asymmetry, "cup", {"a4": 2.7}, (180.0, 240.0))
+    endless = Term(asymmetry, "cup", {"a4": 2.7}, ALWAYS)
+    assert comparison.possible(planted(STATION, [passing])) is not None
+    assert comparison.possible(planted(STATION, [endless])) is None
+    searcher = searcher_of(comparison, baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    found = fit(null, STATION, [passing], None, iterations=0)
+    assert refined_interval(searcher, null, found).terms == (passing,)

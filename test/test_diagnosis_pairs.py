@@ -8,9 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.fitting import Term, planted
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.fitting import Term, fit, planted
+from wind_sensors.diagnosis.moves import simplified
 from wind_sensors.diagnosis.pairs import promise
+from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 
 
@@ -48,3 +52,21 @@ def test_a_heavy_rotor_in_a_bad_bearing_is_not_called_iced() -> None:
     named = {f.term.effect.name for f in found.findings}
     assert {"rotor_inertia", "bearing_friction"} <= named
     assert "icing" not in named
+
+
+def test_ice_without_weight_is_a_calibration() -> None:
+    drifted = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 0.9})
+    searcher = searcher_of(prepare(recorded(drifted, 69)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    ice = Term(catalogue()["icing"], "cup", {"gain": 0.9, "inertia_factor": 1.01})
+    weightless = fit(null, STATION, [ice], None, iterations=0)
+    (left,) = simplified(searcher, null, weightless).terms
+    assert left.key == ("calibration_drift", "cup")
+    assert left.values["gain"] == pytest.approx(0.9, abs=0.01)
+
+
+def test_of_a_healthy_rotor_no_ice_is_left() -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 69)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    ice = Term(catalogue()["icing"], "cup", {"gain": 0.97, "inertia_factor": 1.01})
+    assert simplified(searcher, null, fit(null, STATION, [ice], None, iterations=0)).terms == ()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,13 +16,17 @@ from wind_sensors.cli.baseline import told_place
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison, prepare
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.diagnosis.learning import default_baseline, learn
 from wind_sensors.diagnosis.reference_lag import is_a_way_of_the_wind
 from wind_sensors.diagnosis.reference_place import Place, delayed
 from wind_sensors.diagnosis.reference_search import located, pooled
+from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.signals import Recording
+
+FloatArray = npt.NDArray[np.float64]
 
 AWAY = 3.0
 STANDS = (-1.5, 2.0)
@@ -151,3 +156,32 @@ def test_witnesses_that_agree_are_believed(
     one, alone = pooled(seen[:1], scatter, prior)
     assert one == pytest.approx(truth, abs=1e-3)
     assert np.trace(covariance) < np.trace(alone)
+
+
+def test_the_error_of_a_place_delays_by_the_direction() -> None:
+    # In the mean wind an error along it comes late by its way, one across it hardly does; the wind
+    # wanders by half a radian and a quarter of its speed.
+    comparison = prepare(recorded(STATION, 9), STATION, Place(0.0, 0.0, 0.5))
+    searcher = searcher_of(comparison, default_baseline(STATION), catalogue(), {})
+    latency = {"latency": 0.5 / float(np.mean(comparison.speed))}
+    late = with_effect(STATION, catalogue()["timestamp_latency"], "cup", latency)
+    n = comparison.coefficients
+    without = comparison.simulate(STATION).flat(comparison.channels)
+    delayed_cup = (comparison.simulate(late).flat(comparison.channels) - without)[:n]
+    mean = comparison.drive.wind.mean(axis=0)[:2]
+    east, north = mean / np.linalg.norm(mean)
+    along = -np.array([east, north]) @ searcher.misplaced[:, :n]
+    across = np.array([north, -east]) @ searcher.misplaced[:, :n]
+
+    def likeness(change: FloatArray) -> float:
+        return float(change @ delayed_cup / (np.linalg.norm(change) * np.linalg.norm(delayed_cup)))
+
+    assert likeness(along) > 0.7
+    assert abs(likeness(across)) < 0.3
+    assert np.linalg.norm(along) == pytest.approx(np.linalg.norm(delayed_cup), rel=0.25)
+
+
+def test_an_unknown_place_has_no_error_of_its_own() -> None:
+    comparison = prepare(recorded(STATION, 9), STATION)
+    searcher = searcher_of(comparison, default_baseline(STATION), catalogue(), {})
+    assert searcher.misplaced.shape[0] == 0

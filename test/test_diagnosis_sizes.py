@@ -223,7 +223,7 @@ def test_a_delay_that_grows_is_no_latency(
     null = searcher.whitener(searcher.bank.without)
     late = Term(catalogue()["timestamp_latency"], "vane", {"latency": 0.5})
     named = fit(null, STATION, [late], searcher.bank.without)
-    adequate = searcher.whitener(named.simulated, named.simulated)
+    adequate = searcher.whitener(named.simulated, named)
     nothing = null.of(searcher.bank.without)
     gain = float(nothing @ nothing) - named.cost
     assert gain > 40.0

@@ -58,7 +58,9 @@ PASSING_BESIDE = 3.0
 """So many times more, if it begins or ends inside the record: effects grow and fade themselves."""
 
 LEAST_SHARE_BESIDE = 0.02
-"""What brings less than this share of the gain so far is the form of what brought that."""
+LEAST_EXACT_SHARE_BESIDE = 0.005
+"""What brings less than this share of the gain so far is the form of what brought that; the second
+where that form is certain."""
 
 MOMENTS = 24
 """Parts of the record."""
@@ -190,9 +192,10 @@ def inexact(current: Fit, nothing: float) -> float:
     gained = nothing - current.cost
     if all(term.effect.exact for term in current.terms):
         share, largest = FURTHER_EXACT_SHARE, LARGEST_EXACT_INEXACTNESS
+        least = LEAST_EXACT_SHARE_BESIDE
     else:
-        share, largest = FURTHER_SHARE, LARGEST_INEXACTNESS
-    most = max(largest, LEAST_SHARE_BESIDE * gained)
+        share, largest, least = FURTHER_SHARE, LARGEST_INEXACTNESS, LEAST_SHARE_BESIDE
+    most = max(largest, least * gained)
     return min(max(share * gained, ACCEPTED_FURTHER_GAIN), most)
 
 

@@ -16,7 +16,11 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.counted_time import where_reference_is, where_vanes_follow
+from wind_sensors.diagnosis.counted_time import (
+    slow_departure,
+    where_reference_is,
+    where_vanes_follow,
+)
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.observation import (
     LOWEST_BAND_FREQUENCY,
@@ -133,6 +137,7 @@ class Comparison:
         expected: Simulated deviation of each vane from `direction` [rad], by channel name.
             Deviations are counted on the turn that lies nearest to it, so that a vane which
             swings through the opposite direction does not jump by a turn in one series only.
+        departure: Slow departure of a vane that stays far from there [rad], by channel name.
         place: Where the reference stands; None: unknown.
         memory: What instruments did in `drive`; None: nothing is kept.
     """
@@ -148,6 +153,7 @@ class Comparison:
     measured: Simulated
     mask: FloatArray | None = None
     expected: Mapping[str, FloatArray] = field(default_factory=dict)
+    departure: Mapping[str, FloatArray] = field(default_factory=dict)
     place: Place | None = None
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
     _simulated: Memory = field(
@@ -179,6 +185,14 @@ class Comparison:
                 misfit = self.masked(self.measured.series[name] - simulated.series[name]) ** 2
                 shares.append(float(np.sum(misfit * (1.0 - weights)) / max(misfit.sum(), 1e-12)))
         return max(shares)
+
+    def with_reference_at(self, place: Place) -> Comparison:
+        """The same, with the wind that comes by if the reference stands so far from where it is
+        taken to stand."""
+        first = self.station.instrument(self.channels[0].instrument)
+        flow = WindAtSensors(self.station, self.drive).flow(first).wind
+        drive = delayed(self.drive, flow, place)
+        return replace(self, drive=drive, memory=DriveMemory(drive))
 
     @property
     def coefficients(self) -> int:
@@ -237,6 +251,15 @@ class Comparison:
             if not only or channel.instrument in only:
                 seen = seen.with_others(self._simulated_alone(station, channel.instrument))
         return seen
+
+    def possible(
+        self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
+    ) -> Simulated | None:
+        """The same; None for a station that cannot be (its rotor runs away, its log is absurd)."""
+        try:
+            return self.simulate(station, only, rest)
+        except (UserError, ValueError):
+            return None
 
     def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
         """Series and statistics of one instrument."""
@@ -307,6 +330,7 @@ class Comparison:
         expected = self.expected.get(channel.name)
         if expected is None:
             return deviation
+        expected = expected + self.departure.get(channel.name, 0.0)
         if time is not None:
             expected = np.interp(time, self.grid.centres, expected)
         turns = np.rint((deviation - expected) / (2.0 * np.pi))
@@ -474,7 +498,10 @@ def prepare(
     )
     comparison = replace(comparison, expected=_expected(comparison))
     known_wind = where_reference_is(recording, grid)
-    followed = where_vanes_follow(_beside_expected(comparison), grid)
+    beside = _beside_expected(comparison)
+    departure = {name: slow_departure(angle, grid) for name, angle in beside.items()}
+    comparison = replace(comparison, departure=departure)
+    followed = where_vanes_follow(beside.values(), grid)
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
@@ -490,9 +517,10 @@ def _expected(comparison: Comparison) -> dict[str, FloatArray]:
     }
 
 
-def _beside_expected(comparison: Comparison) -> list[FloatArray]:
-    """Measured minus simulated angle of each vane [rad]."""
+def _beside_expected(comparison: Comparison) -> dict[str, FloatArray]:
+    """Measured minus simulated angle of each vane [rad], by channel name."""
     seen = comparison.observe({}, comparison.recording.angles).series
-    return [
-        series / comparison.speed - comparison.expected[name] for name, series in seen.items()
-    ]
+    return {
+        name: series / comparison.speed - comparison.expected[name]
+        for name, series in seen.items()
+    }

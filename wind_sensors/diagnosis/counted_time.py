@@ -9,10 +9,12 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.observation import Grid
+from wind_sensors.motion.frames import wrap
 from wind_sensors.station.signals import Recording
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+IndexArray = npt.NDArray[np.intp]
 
 LONGEST_GAP = 1.0
 """Where the reference is silent for longer [s], nothing is compared."""
@@ -31,6 +33,9 @@ LONGEST_TURNING = 20.0
 
 MOST_TURNING = 0.05
 """Nor is what takes a larger share of a recording."""
+
+DEPARTURE_TIME = 5.0
+"""A vane that stays away does so on average over this time [s]."""
 
 EDGE = 9
 """Weights rise and fall within so many bins."""
@@ -62,14 +67,46 @@ def where_vanes_follow(differences: Iterable[FloatArray], grid: Grid) -> FloatAr
     """
     weight = np.ones(grid.n)
     for difference in differences:
-        away = np.abs(difference) > TURNED_ROUND
-        begins, ends = _runs(_widened(away, round(BESIDE_TURNING / grid.dt)))
-        often = np.sum(ends - begins) > MOST_TURNING * grid.n
-        if often or np.any((ends - begins) * grid.dt > LONGEST_TURNING):
+        begins, ends = _turning(difference, grid)
+        if _stays_away(begins, ends, grid):
             continue
         for begin, end in zip(begins, ends, strict=True):
             weight[begin:end] = 0.0
     return _soft(weight)
+
+
+def slow_departure(difference: FloatArray, grid: Grid) -> FloatArray:
+    """How far a vane points from where it should, slowly and continuously [rad], shape (n,).
+
+    A vane that counts the other way round comes to point backwards, where each reading would lie a
+    turn above or below by chance; near its own slow departure none does.
+
+    Args:
+        difference: Measured minus simulated angle at the bins [rad].
+        grid: Bins.
+
+    Returns:
+        Nought for vanes that stay near, or turn round for some seconds only.
+    """
+    if not _stays_away(*_turning(difference, grid), grid):
+        return np.zeros(grid.n)
+    width = round(DEPARTURE_TIME / grid.dt)
+    east, north = (
+        uniform_filter1d(f(difference), width, mode="nearest") for f in (np.cos, np.sin)
+    )
+    return np.asarray(np.unwrap(np.arctan2(north, east)), dtype=np.float64)
+
+
+def _turning(difference: FloatArray, grid: Grid) -> tuple[IndexArray, IndexArray]:
+    """First bins and ends of the times in which a vane is turned round."""
+    away = np.abs(wrap(difference)) > TURNED_ROUND
+    return _runs(_widened(away, round(BESIDE_TURNING / grid.dt)))
+
+
+def _stays_away(begins: IndexArray, ends: IndexArray, grid: Grid) -> bool:
+    """Whether a vane is turned round for longer, or more often, than by a wind from behind."""
+    often = np.sum(ends - begins) > MOST_TURNING * grid.n
+    return bool(often or np.any((ends - begins) * grid.dt > LONGEST_TURNING))
 
 
 def _widened(inside: BoolArray, bins: int) -> BoolArray:
@@ -77,7 +114,7 @@ def _widened(inside: BoolArray, bins: int) -> BoolArray:
     return np.convolve(inside, np.ones(2 * bins + 1), "same") > 0.5
 
 
-def _runs(inside: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _runs(inside: BoolArray) -> tuple[IndexArray, IndexArray]:
     """First bins and ends of the runs in which something holds."""
     edges = np.diff(np.concatenate(([False], inside, [False])).astype(np.int8))
     return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,8 +44,11 @@ REMAINDER_SCORES = {
 raise the power of a band on healthy days, too; a named effect leaves less than this where its form
 may differ from the simulation's."""
 
-REMAINDER_SHARE = 0.02
-"""Share of what there was to explain beyond which a structured remainder makes it unknown."""
+REMAINDER_SCORE = 0.8
+REMAINDER_SHARE = 0.025
+"""A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
+times its share of what there was to explain is more than the second: of a large effect the form may
+leave more."""
 
 RIVAL_SHARE = 0.2
 RIVAL_SCORE = 0.5
@@ -96,6 +99,9 @@ the data."""
 UNSEEN_GAIN = 200.0
 """What begins or ends inside the record and brings more need not stand out in a region: what
 changes the quick part of a signal moves none up or down."""
+
+PASSING_P = 0.02
+"""It stands out below this probability: of the many intervals that were tried one fits a gust."""
 
 SURE_GAIN = 100.0
 SURE_SIZE = 3.0
@@ -189,12 +195,14 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
     weights = comparison.weights(naming.whitener.trust)
     without = comparison.simulate(station).flat(comparison.channels)
 
-    def change(terms: Sequence[Term]) -> FloatArray:
-        moved = comparison.simulate(planted(station, terms)).flat(comparison.channels)
-        return np.asarray(np.nan_to_num(moved - without) * weights)
-
     first, second = naming.fit.terms
-    squares = [change(terms) ** 2 for terms in ((first,), (second,), naming.fit.terms)]
+    squares = []
+    for terms in ((first,), (second,), naming.fit.terms):
+        moved = comparison.possible(planted(station, terms))
+        if moved is None:
+            return False
+        change = np.nan_to_num(moved.flat(comparison.channels) - without) * weights
+        squares.append(change**2)
     n = comparison.coefficients
     for k in range(len(comparison.channels)):
         one, other, together = (float(s[k * n : (k + 1) * n].sum()) for s in squares)
@@ -221,7 +229,9 @@ def varies(naming: Naming, station: Station) -> bool:
         if term.interval != ALWAYS or term.effect.noisy or not term.effect.exact:
             continue
         others = [t for t in naming.fit.terms if t is not term]
-        without = comparison.simulate(planted(station, others))
+        without = comparison.possible(planted(station, others))
+        if without is None:
+            continue
         cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
         cells = null.through_standing(in_series(comparison, cells))
         for length in (1, 2, 4):
@@ -243,7 +253,9 @@ def unevenness(naming: Naming, station: Station, term: Term) -> float:
     null = naming.adequate
     comparison = null.comparison
     others = [t for t in naming.fit.terms if t is not term]
-    without = comparison.simulate(planted(station, others))
+    without = comparison.possible(planted(station, others))
+    if without is None:
+        return 0.0
     n = comparison.coefficients
     halves = np.zeros((2, n * len(comparison.channels)))
     for k, channel in enumerate(comparison.channels):
@@ -313,7 +325,7 @@ def passes_unseen(findings: tuple[Finding, ...], gain: float) -> bool:
         f.term.interval != ALWAYS
         and not f.term.effect.legible
         and f.proof is not None
-        and f.p > REMAINDER_P
+        and not _shows(f)
         for f in findings
     )
 
@@ -362,7 +374,12 @@ def _has_a_size(finding: Finding) -> bool:
 
 def stands_out(findings: tuple[Finding, ...]) -> bool:
     """Whether the data show a mismatch where one of the findings acts."""
-    return any(f.p < REMAINDER_P for f in findings)
+    return any(_shows(f) for f in findings)
+
+
+def _shows(finding: Finding) -> bool:
+    passing = finding.term.interval != ALWAYS and not finding.term.effect.legible
+    return finding.p < (PASSING_P if passing else REMAINDER_P)
 
 
 def verdict_of(
@@ -397,7 +414,8 @@ def verdict_of(
     asked_for = located_p <= REMAINDER_P or naming.gain > CERTAIN_GAIN
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
-    rivals = remainder.score > RIVAL_SCORE and p < REMAINDER_P and share > RIVAL_SHARE
-    if (structured and share > REMAINDER_SHARE) or rivals or _patchwork(naming):
+    clear = remainder.score > REMAINDER_SCORE and remainder.score * share > REMAINDER_SHARE
+    rivals = remainder.score > RIVAL_SCORE and share > RIVAL_SHARE
+    if (p < REMAINDER_P and (clear or rivals)) or _patchwork(naming):
         return "unknown"
     return "ambiguous" if equal else "named"

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.search import (
     PENALTY_PER_FURTHER_PARAMETER,
@@ -126,7 +125,7 @@ class Judged:
 def judged(
     searcher: Searcher,
     explanations: Sequence[Fit],
-    named: Simulated | None = None,
+    named: Fit | None = None,
     roughly: bool = False,
     iterations: int = 3,
 ) -> list[Judged]:
@@ -135,7 +134,7 @@ def judged(
     Args:
         searcher: The search.
         explanations: Fits in whatever null.
-        named: Simulation of effects whose form need not be exact.
+        named: Effects that are taken for granted, in a form that need not be exact.
         roughly: Carry the fits' derivatives along, which may cost some units; for a first choice.
         iterations: Largest number of Gauss-Newton steps.
     """

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
 from wind_sensors.diagnosis.whitening import Whitener
-from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -175,10 +174,10 @@ class Problem:
     def simulate(self, values: FloatArray) -> Simulated:
         """Simulation with given parameters."""
         self.evaluations += 1
-        terms = _with_values(self._terms, values)
-        return self._whitener.comparison.simulate(
-            planted(self._station, terms), self._only, self._rest
-        )
+        return self._whitener.comparison.simulate(self._tried(values), self._only, self._rest)
+
+    def _tried(self, values: FloatArray) -> Station:
+        return planted(self._station, _with_values(self._terms, values))
 
     def vector(self, values: FloatArray) -> tuple[FloatArray, Simulated]:
         """White vector and simulation."""
@@ -230,10 +229,8 @@ class Problem:
 
     def _possible(self, values: FloatArray) -> Simulated | None:
         """Simulation with given parameters; None where the station is impossible."""
-        try:
-            return self.simulate(values)
-        except (UserError, ValueError):
-            return None
+        self.evaluations += 1
+        return self._whitener.comparison.possible(self._tried(values), self._only, self._rest)
 
     def compared(self, simulated: Simulated) -> FloatArray:
         """What is compared of a simulation, shape (l,)."""

@@ -56,9 +56,6 @@ DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
 other, and nothing shows the way."""
 
-NEAR_AN_END = 20.0
-"""What begins or ends this close to the record's own ends [s] holds all the time."""
-
 DEAD_TIME_CUTS = 30
 """Places in the record where a counter may begin or cease to lose what follows too soon."""
 
@@ -90,7 +87,7 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     silent = dead_log(comparison.drive)
     if silent is not None:
         still = _term("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
-        out[still.key] = [replace(still, interval=interval_of(comparison, *silent, NEAR_AN_END))]
+        out[still.key] = [replace(still, interval=interval_of(comparison, *silent))]
     leans = [
         _term("axis_tilt", STATION, tilt_x=LEAN * np.cos(towards), tilt_y=LEAN * np.sin(towards))
         for towards in np.arange(8) * np.pi / 4.0
@@ -232,7 +229,7 @@ def _dead_times(
         missing = int(np.count_nonzero(usual < 0.97 * shortest))
         # The whole record comes first: a part of it must miss more than all of it does.
         if missing > 0.004 * usual.size and (best is None or missing > best[0]):
-            best = missing, shortest, interval_of(comparison, begin, end, NEAR_AN_END)
+            best = missing, shortest, interval_of(comparison, begin, end)
     if best is None:
         return []
     _, shortest, holds = best
@@ -352,7 +349,7 @@ def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
     step = float(np.median(np.diff(inside)))
     turns = np.exp(2j * np.pi * inside / step)
     origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
-    holds = interval_of(comparison, float(time[begin]), float(time[end - 1]), NEAR_AN_END)
+    holds = interval_of(comparison, float(time[begin]), float(time[end - 1]))
     return [replace(_term("quantisation", vane, step=step, origin=origin), interval=holds)]
 
 

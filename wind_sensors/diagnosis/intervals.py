@@ -19,6 +19,9 @@ from wind_sensors.diagnosis.fitting import Interval
 
 FloatArray = npt.NDArray[np.float64]
 
+NEAR_AN_END = 20.0
+"""What begins or ends this close to the record's own ends [s] holds all the time there."""
+
 _WEAKEST = 1e-2
 _RIDGE = 1e-3
 
@@ -38,19 +41,18 @@ class IntervalGains:
     amplitudes: FloatArray
 
 
-def interval_of(comparison: Comparison, begin: float, end: float, near: float) -> Interval:
+def interval_of(comparison: Comparison, begin: float, end: float) -> Interval:
     """A stretch [s since the first bin] as an interval of the recording.
 
     Args:
         comparison: The recording.
-        begin, end: Of the stretch.
-        near: What begins or ends this close to the record's own ends [s] has no beginning, no end.
+        begin, end: Of the stretch; no beginning, no end within `NEAR_AN_END` of the record's own.
     """
     since = comparison.drive.elapsed
     length = comparison.grid.n * comparison.grid.dt
     return (
-        begin + since if begin > near else 0.0,
-        None if end > length - near else end + since,
+        begin + since if begin > NEAR_AN_END else 0.0,
+        None if end > length - NEAR_AN_END else end + since,
     )
 
 

@@ -9,8 +9,10 @@ from wind_sensors.diagnosis.acceptance import (
     ACCEPTED_FURTHER_GAIN,
     ACCEPTED_GAIN,
     inexact,
+    is_plausible,
     large_enough,
     may_join,
+    needed_gain,
     overlap,
     plausible,
 )
@@ -55,6 +57,46 @@ def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
             break
         current = best
     return current
+
+
+def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit without what ran into its bounds, or became too small, when all were fitted together.
+
+    Of an effect that says too much (ice without weight) what it contains may stay.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+    """
+    nothing = no_terms(whitener, searcher)
+    while not all(is_plausible(term) for term in current.terms):
+        fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms))
+        sound = [f for f in fewer if f.terms and all(is_plausible(t) for t in f.terms)]
+        sound = sound or [f for f in fewer if f.terms]
+        if not sound:
+            return nothing
+        current = min(sound, key=total)
+        needed = min(needed_gain(nothing, term, searcher.baseline) for term in current.terms)
+        if total(nothing) - total(current) < needed:
+            return nothing
+    return current
+
+
+def _simpler(searcher: Searcher, terms: Sequence[Term]) -> list[list[Term]]:
+    """The terms without the implausible ones, and with what these contain in their place."""
+    sound = [term for term in terms if is_plausible(term)]
+    out = [sound] if sound else []
+    for term in terms:
+        if is_plausible(term):
+            continue
+        for contained in sorted(term.effect.contains & searcher.effects.keys()):
+            effect = searcher.effects[contained]
+            values = {p.name: term.values[p.name] for p in effect.parameters
+                      if p.name in term.values}
+            if len(values) == len(effect.parameters):
+                out.append([*sound, replace(term, effect=effect, values=values)])
+    return out
 
 
 def merged(

@@ -11,13 +11,11 @@ from wind_sensors.diagnosis.acceptance import (
     brought,
     inexactness,
     is_a_stall,
-    is_plausible,
     may_join,
     needed_gain,
     passing_gain,
     plausible,
 )
-from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
@@ -32,7 +30,7 @@ from wind_sensors.diagnosis.explanation import (
 )
 from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
-from wind_sensors.diagnosis.moves import merged, pruned, swapped
+from wind_sensors.diagnosis.moves import merged, pruned, simplified, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.pairs import better_pair
 from wind_sensors.diagnosis.regions import region_bank
@@ -207,7 +205,7 @@ def _not_told(one: Judged) -> bool:
 
 
 def _with_sharp_intervals(
-    searcher: Searcher, null: Whitener, ranked: Sequence[Judged], named: Simulated | None
+    searcher: Searcher, null: Whitener, ranked: Sequence[Judged], named: Fit | None
 ) -> list[Judged]:
     """The same explanations with beginnings and ends where they fit best; best first.
 
@@ -215,7 +213,7 @@ def _with_sharp_intervals(
         searcher: The search.
         null: Of the terms so far.
         ranked: Explanations with one more.
-        named: Simulation of the terms so far; None: there are none.
+        named: The terms so far; None: there are none.
     """
 
     def sharper(one: Judged) -> Fit:
@@ -318,10 +316,10 @@ def _greedy(
     alone: tuple[Term, ...] = ()
     for turn in range(MOST_EFFECTS):
         first = turn == 0
-        named = None if first else current.simulated
+        named = None if first else current
         if named is not None:
             # What is left is judged as what the named effects, in another form, do not explain.
-            whitener = searcher.whitener(named, named)
+            whitener = searcher.whitener(named.simulated, named)
             current = seen_in(whitener, current)
         if first:
             fits = [f for f in singles if f.terms[0].effect.name not in excluded]
@@ -392,7 +390,7 @@ def _settled(
         screened: Best scores of the first screening.
     """
     whitener = searcher.whitener(current.simulated)
-    current = _without_implausible(searcher, whitener, seen_in(whitener, current))
+    current = simplified(searcher, whitener, seen_in(whitener, current))
     if current.terms:
         current = with_interval(searcher, current)
         whitener = searcher.whitener(current.simulated)
@@ -400,7 +398,7 @@ def _settled(
     nothing = whitener.of(searcher.bank.without)
     adequate = whitener
     if current.terms:
-        adequate = searcher.whitener(current.simulated, current.simulated)
+        adequate = searcher.whitener(current.simulated, current)
         current = replace(
             current, covariance=covariance_of(adequate, searcher.station, current)
         )
@@ -408,19 +406,3 @@ def _settled(
         current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
         alternatives, screened,
     )  # fmt: skip
-
-
-def _without_implausible(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
-    """The fit without terms that ran into their bounds when all were fitted together."""
-    nothing = no_terms(whitener, searcher)
-    while not all(is_plausible(term) for term in current.terms):
-        kept = [term for term in current.terms if is_plausible(term)]
-        if not kept:
-            return nothing
-        current = fit(whitener, searcher.station, kept, searcher.bank.without)
-        needed = min(needed_gain(nothing, term, searcher.baseline) for term in kept)
-        if total(nothing) - total(current) < needed:
-            return nothing
-    return current
-
-

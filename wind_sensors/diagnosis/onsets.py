@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import seen_in, total
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit, planted
 from wind_sensors.diagnosis.intervals import (
+    NEAR_AN_END,
     IntervalGains,
     cell_signatures,
     interval_gains,
@@ -34,9 +35,6 @@ WINDOW_STEP = 30.0
 
 SHORTEST_WINDOW = 60.0
 """What lasts less [s] tells an effect badly from a gust."""
-
-NEAR_AN_END = 8.0
-"""A beginning or an end this close to the record's own [s] is none."""
 
 WINDOW_CANDIDATES = 4
 WINDOW_ADVANTAGE = 15.0
@@ -138,7 +136,7 @@ def window_starts(
         score = Score(
             *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)
         )
-        interval = interval_of(searcher.comparison, *span.window, NEAR_AN_END)
+        interval = interval_of(searcher.comparison, *span.window)
         starts = [Term(effect, key[1], starting_values(score), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
         if key not in found or span.net > found[key][0]:
@@ -166,19 +164,23 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
     """
     comparison = searcher.comparison
     fixed = candidate.terms[:-1]
-    without = comparison.simulate(planted(searcher.station, fixed))
+    without = comparison.possible(planted(searcher.station, fixed))
+    if without is None:
+        return candidate
     best = candidate
     always: Simulated | None = None
     for step in (WINDOW_STEP, *REFINING_STEPS):
         if always is None:
             endless = replace(best.terms[-1], interval=ALWAYS)
-            always = comparison.simulate(planted(searcher.station, [*fixed, endless]))
+            always = comparison.possible(planted(searcher.station, [*fixed, endless]))
+        if always is None:
+            break
         window = _best_window(
             searcher, whitener, (without, always), best.terms[-1].interval, step
         )
         if window is None:
             break
-        interval = interval_of(searcher.comparison, *window, NEAR_AN_END)
+        interval = interval_of(searcher.comparison, *window)
         if interval in (best.terms[-1].interval, ALWAYS):
             continue
         moved = replace(best.terms[-1], interval=interval)
@@ -244,10 +246,12 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
     for term in current.terms:
         if term.interval != ALWAYS or term.effect.legible:
             continue
-        whitener = searcher.whitener(current.simulated, current.simulated)
+        whitener = searcher.whitener(current.simulated, current)
         known = seen_in(whitener, current)
         others = [t for t in current.terms if t.key != term.key]
-        without = comparison.simulate(planted(searcher.station, others))
+        without = comparison.possible(planted(searcher.station, others))
+        if without is None:
+            continue
         start = whitener.of(without)
         cuts = _screening_cuts(searcher)
         cells = cell_signatures(comparison, without, current.simulated, whitener.trust, cuts)
@@ -255,7 +259,7 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
         span = _best_span(gains, SHORTEST_WINDOW)
         if span is None or known.cost - (float(start @ start) - span.net) < ONSET_GAIN:
             continue
-        interval = interval_of(comparison, *span.window, NEAR_AN_END)
+        interval = interval_of(comparison, *span.window)
         passing = replace(term, interval=interval)
         trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
         trial = refined_interval(searcher, whitener, trial)

@@ -25,17 +25,19 @@ from wind_sensors.diagnosis.screening import (
 from wind_sensors.diagnosis.signatures import (
     SignatureBank,
     in_parallel,
+    misplaced,
     signature_bank,
     templates_of,
     with_larger,
 )
 from wind_sensors.diagnosis.whitening import (
+    CERTAIN_FORM_ERROR,
+    FORM_ERROR,
     Whitener,
     form_signatures,
     trust_of,
     whitener_of,
 )
-from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -78,6 +80,7 @@ class Searcher:
         baseline: What is normal.
         bank: Signatures of the catalogue, of which the null lets healthy days have a little.
         probes: The same with larger sizes, for screening.
+        misplaced: What the error of the reference's place changes, one standard deviation a row.
         effects: The catalogue.
         workers: Processes.
     """
@@ -86,6 +89,7 @@ class Searcher:
     baseline: Baseline
     bank: SignatureBank
     probes: SignatureBank
+    misplaced: FloatArray
     effects: Mapping[str, Effect]
     guesses: Mapping[tuple[str, str], Sequence[Term]]
     workers: int = 1
@@ -95,18 +99,18 @@ class Searcher:
         """The station as commissioned."""
         return self.baseline.station
 
-    def whitener(self, simulated: Simulated, named: Simulated | None = None) -> Whitener:
+    def whitener(self, simulated: Simulated, named: Fit | None = None) -> Whitener:
         """The null seen from the best simulation so far.
 
         Args:
             simulated: Gives the noise.
-            named: Simulation with effects that are taken for granted, in a form that need not be
-                exact; None: there are none.
+            named: Effects that are taken for granted, in a form that need not be exact; None:
+                there are none.
         """
         trust = trust_of(self.comparison, simulated, self.baseline)
         return self._whitener(trust, named)
 
-    def _whitener(self, trust: Mapping[str, Trust], named: Simulated | None) -> Whitener:
+    def _whitener(self, trust: Mapping[str, Trust], named: Fit | None) -> Whitener:
         templates = self.bank.templates
         calm = calm_share(self.comparison, self.baseline)
         standing = np.array(
@@ -121,12 +125,17 @@ class Searcher:
         )
         means = np.array([self.baseline.means.get(t.key, 0.0) for t in templates])
         signatures = self.bank.whitened(self.comparison, trust)
-        lag = lag_weights(self.comparison, templates) @ signatures
+        way = self.misplaced * self.comparison.weights(trust)
+        lag = np.concatenate((lag_weights(self.comparison, templates) @ signatures, way))
         signatures = np.concatenate((signatures, lag))
         standing = np.concatenate((standing, np.ones(len(lag))))
         means = np.concatenate((means, np.zeros(len(lag))))
         if named is not None:
-            form = form_signatures(self.comparison, trust, self.bank.without, named)
+            certain = all(term.effect.exact for term in named.terms)
+            form = form_signatures(
+                self.comparison, trust, self.bank.without, named.simulated,
+                CERTAIN_FORM_ERROR if certain else FORM_ERROR,
+            )  # fmt: skip
             signatures = np.concatenate((signatures, form))
             standing = np.concatenate((standing, np.ones(len(form))))
             means = np.concatenate((means, np.zeros(len(form))))
@@ -228,9 +237,8 @@ class Searcher:
                         for n in comparison.affected(self.station, t.instrument)
                     }
                 )
-            try:
-                simulated = comparison.simulate(station, only, rest)
-            except (UserError, ValueError):
+            simulated = comparison.possible(station, only, rest)
+            if simulated is None:
                 continue
             null = self.whitener(simulated) if smooths else whitener
             ranked.append((null.deviance(simulated), k))
@@ -291,4 +299,5 @@ def searcher_of(
     templates = templates_of(comparison, baseline.station, effects)
     bank = signature_bank(comparison, baseline.station, templates, workers, progress)
     probes = with_larger(bank, comparison, baseline.station, workers)
-    return Searcher(comparison, baseline, bank, probes, effects, guesses, workers)
+    way = misplaced(comparison, baseline.station, bank.without)
+    return Searcher(comparison, baseline, bank, probes, way, effects, guesses, workers)

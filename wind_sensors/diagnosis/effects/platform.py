@@ -98,8 +98,8 @@ PLATFORM_VELOCITY = Effect(
     region="with the carrier's speed and heading",
     parameters=(
         Parameter(
-            "velocity_share", "1", -1.0, 2.0, healthy=1.0, minimum=MISSING_SHARE,
-            starts=(0.0, 0.5, 1.6), step=0.02,
+            "velocity_share", "1", -1.0, 1.0, healthy=1.0, minimum=MISSING_SHARE,
+            starts=(0.0, 0.5), step=0.02,
         ),
         Parameter(
             "position_share", "1", 0.0, 1.0, healthy=0.0, starts=(1.0,), step=0.02,

@@ -273,7 +273,7 @@ ICING = Effect(
     standing=0.0,
     smooths=True,
     parameters=(
-        Parameter("gain", "1", 0.2, 1.1, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
+        Parameter("gain", "1", 0.2, 1.0, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(
             "inertia_factor", "1", 0.8, 12.0, healthy=1.0, minimum=0.4, step=0.1, starts=(1.5,)
         ),
