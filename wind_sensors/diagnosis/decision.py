@@ -46,9 +46,10 @@ may differ from the simulation's."""
 
 REMAINDER_SCORE = 0.8
 REMAINDER_SHARE = 0.025
+LEAST_REMAINDER = 0.01
 """A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
-times its share of what there was to explain is more than the second: of a large effect the form may
-leave more."""
+times its share of what there was to explain is more than the second, and that share more than the
+third: of a large effect the form may leave more."""
 
 RIVAL_SHARE = 0.2
 RIVAL_SCORE = 0.5
@@ -414,7 +415,8 @@ def verdict_of(
     asked_for = located_p <= REMAINDER_P or naming.gain > CERTAIN_GAIN
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
-    clear = remainder.score > REMAINDER_SCORE and remainder.score * share > REMAINDER_SHARE
+    sizeable = share > max(REMAINDER_SHARE / max(remainder.score, 1e-9), LEAST_REMAINDER)
+    clear = remainder.score > REMAINDER_SCORE and sizeable
     rivals = remainder.score > RIVAL_SCORE and share > RIVAL_SHARE
     if (p < REMAINDER_P and (clear or rivals)) or _patchwork(naming):
         return "unknown"
