@@ -11,13 +11,7 @@ from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.acceptance import PASSING_FORM_GAIN, PASSING_GAIN, passing_gain
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import (
-    borne_out,
-    determined,
-    is_uneven,
-    made_up,
-    passes_unseen,
-)
+from wind_sensors.diagnosis.contradictions import is_uneven
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
@@ -27,6 +21,7 @@ from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.diagnosis.spectra import to_cosine
+from wind_sensors.diagnosis.support import borne_out, determined, made_up, passes_unseen
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.diagnosis.whitening import form_signatures, trust_of, unstanding
 from wind_sensors.errors import UserError

@@ -11,7 +11,7 @@ from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 from wind_sensors.diagnosis.acceptance import is_its_moment, overlap
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import prepare
-from wind_sensors.diagnosis.decision import undo_each_other, varies
+from wind_sensors.diagnosis.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import Judged, Naming, no_terms

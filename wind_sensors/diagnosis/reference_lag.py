@@ -13,10 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.effects.definition import STATION
 from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.diagnosis.signatures import Template
+from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -68,6 +70,29 @@ def lag_weights(comparison: Comparison, templates: Sequence[Template]) -> FloatA
             drifting[k] = 1e6 * turning / half / template.values["drift"]
     found = np.array([common, drifting, *rows])
     return np.asarray(found[np.any(found, axis=1)])
+
+
+def misplaced(comparison: Comparison, station: Station, without: Simulated) -> FloatArray:
+    """What the error of the reference's place changes, one standard deviation a row.
+
+    Its delays follow the wind's direction, so that on a platform they change with the course.
+
+    Args:
+        comparison: The recording.
+        station: The station as commissioned.
+        without: Its simulation.
+
+    Returns:
+        Changes of what is compared, shape (2, l), or (0, l) for a reference at the instruments.
+    """
+    healthy = without.flat(comparison.channels)
+    place = comparison.place
+    error = COMMON_LAG * _separation(comparison) if place is None else place.error
+    if error == 0.0:
+        return np.zeros((0, healthy.size))
+    shifts = (Place(error, 0.0, 0.0), Place(0.0, error, 0.0))
+    moved = [comparison.with_reference_at(shift).simulate(station) for shift in shifts]
+    return np.array([np.nan_to_num(m.flat(comparison.channels) - healthy) for m in moved])
 
 
 def is_a_way_of_the_wind(comparison: Comparison, term: Term) -> bool:

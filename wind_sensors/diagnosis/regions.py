@@ -216,7 +216,7 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
         size = comparison.measured.statistics[channel.name].size
         for k in range(size):
             kind = "spectrum" if k < BANDS else "statistic"
-            label = _eddies(channel, k) if k < BANDS else STATISTICS[channel.kind][k - BANDS]
+            label = eddies(channel, k) if k < BANDS else STATISTICS[channel.kind][k - BANDS]
             statistics.append(
                 (Region(channel.name, kind, float(k), float(k + 1), label), place + k)
             )
@@ -237,7 +237,8 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
     return RegionBank(bank.regions, bank.signatures, bank.bands, bank.statistics, null)
 
 
-def _eddies(channel: Channel, band: int) -> str:
+def eddies(channel: Channel, band: int) -> str:
+    """What a band of a channel's spectrum shows, for people."""
     longest, shortest = 2.0 * np.pi * channel.length / NORMALISED_BANDS[band : band + 2]
     return f"power of eddies of {shortest:.3g} to {longest:.3g} m"
 

@@ -14,7 +14,7 @@ from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
-from wind_sensors.diagnosis.reference_lag import lag_weights
+from wind_sensors.diagnosis.reference_lag import lag_weights, misplaced
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
     Score,
@@ -25,7 +25,6 @@ from wind_sensors.diagnosis.screening import (
 from wind_sensors.diagnosis.signatures import (
     SignatureBank,
     in_parallel,
-    misplaced,
     signature_bank,
     templates_of,
     with_larger,

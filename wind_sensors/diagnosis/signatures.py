@@ -20,7 +20,6 @@ from wind_sensors.diagnosis.effects.definition import (
     with_effect,
 )
 from wind_sensors.diagnosis.observation import Channel
-from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -226,28 +225,6 @@ def signature_bank(
     parts = in_parallel(_planting(comparison, station), templates, workers, progress)
     with_each = [without.with_others(part) for part in parts]
     return SignatureBank(templates, without, with_each)
-
-
-def misplaced(comparison: Comparison, station: Station, without: Simulated) -> FloatArray:
-    """What the error of a learnt place of the reference changes, one standard deviation a row.
-
-    Its delays follow the wind's direction, so that on a platform they change with the course.
-
-    Args:
-        comparison: The recording.
-        station: The station as commissioned.
-        without: Its simulation.
-
-    Returns:
-        Changes of what is compared, shape (2, l), or (0, l) without a known place.
-    """
-    healthy = without.flat(comparison.channels)
-    place = comparison.place
-    if place is None:
-        return np.zeros((0, healthy.size))
-    shifts = (Place(place.error, 0.0, 0.0), Place(0.0, place.error, 0.0))
-    moved = [comparison.with_reference_at(shift).simulate(station) for shift in shifts]
-    return np.array([np.nan_to_num(m.flat(comparison.channels) - healthy) for m in moved])
 
 
 def with_larger(

@@ -12,19 +12,12 @@ from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration, too_calm
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
+from wind_sensors.diagnosis.contradictions import is_uneven, undo_each_other, varies
 from wind_sensors.diagnosis.decision import (
     REMAINDER_P,
     Verdict,
-    borne_out,
-    determined,
     is_noisy,
-    is_uneven,
-    made_up,
-    passes_unseen,
     remainder_of,
-    stands_out,
-    undo_each_other,
-    varies,
     verdict_of,
     with_own_noise,
 )
@@ -39,6 +32,13 @@ from wind_sensors.diagnosis.noise_level import described, excess_of
 from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
 from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
+from wind_sensors.diagnosis.support import (
+    borne_out,
+    determined,
+    made_up,
+    passes_unseen,
+    stands_out,
+)
 from wind_sensors.diagnosis.whitening import Whitener
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording

@@ -11,14 +11,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import Comparison, Simulated
-from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.baseline import ChannelBaseline
+from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
+from wind_sensors.diagnosis.observation import STATISTICS, Channel
+from wind_sensors.diagnosis.regions import eddies
 from wind_sensors.report import style
 
 FloatArray = npt.NDArray[np.float64]
 
 _SMOOTHING = 15.0
 _LEAST_BINS = 40
+
+_USUAL = 2.0
+"""Healthy days stay within so many standard deviations."""
+
+_TELLING = 4.0
+"""Statistics are drawn if one of them departs further than this."""
+
+_FURTHEST = 40.0
+"""Beyond so many standard deviations a point is drawn at the edge, with its number."""
 
 
 def as_svg(made: Figure) -> str:
@@ -111,6 +122,68 @@ def residual_figure(
             axes.set_xlabel(label)
         by_direction.set_ylabel(unit)
         _spectra(comparison, simulated, corrected, channel, by_frequency)
+    return made
+
+
+def statistics_figure(
+    comparison: Comparison,
+    known: ChannelBaseline,
+    simulated: Simulated,
+    corrected: Simulated | None,
+    channel: Channel,
+) -> Figure | None:
+    """How far spectra and statistics of the raw signals lie from the simulation's; before, after.
+
+    Pulses that are lost, readings in steps or a vane that sticks move no mean: they show here.
+
+    Args:
+        comparison: The recording.
+        known: What they do on healthy days.
+        simulated: Simulation of the station as it is described.
+        corrected: With the named physics; None: nothing is named.
+        channel: What is shown.
+
+    Returns:
+        None if nothing departs from healthy days.
+    """
+
+    def departures(expected: Simulated) -> FloatArray:
+        away = comparison.measured.statistics[channel.name] - expected.statistics[channel.name]
+        return np.asarray((away - known.statistics_mean) / known.statistics_deviation)
+
+    before = departures(simulated)
+    shown = np.flatnonzero(np.isfinite(before) & np.isfinite(known.statistics_deviation))
+    if not np.any(np.abs(before[shown]) > _TELLING):
+        return None
+    after = before if corrected is None else departures(corrected)
+    labels = [*(eddies(channel, k) for k in range(BANDS)), *STATISTICS[channel.kind]]
+    with style.house():
+        made = Figure(figsize=(9.0, 1.1 + 0.27 * shown.size), layout="constrained")
+        axes = made.add_subplot()
+        axes.axvspan(-_USUAL, _USUAL, color=style.GRID, zorder=0)
+        rows = np.arange(shown.size)
+        for values, colour, label in (
+            (before, style.RAW, "before"), (after, style.CORRECTED, "with it")
+        ):  # fmt: skip
+            if label == "with it" and corrected is None:
+                continue
+            drawn = np.clip(np.nan_to_num(values[shown]), -_FURTHEST, _FURTHEST)
+            axes.plot(drawn, rows, "o", color=colour, markersize=5.0, label=label)
+            for row, value in zip(rows, values[shown], strict=True):
+                if abs(value) > _FURTHEST:
+                    side = "right" if value > 0.0 else "left"
+                    axes.annotate(
+                        f"{value:.0f}", (float(np.clip(value, -_FURTHEST, _FURTHEST)), row),
+                        xytext=(-8 if value > 0.0 else 8, 0), textcoords="offset points",
+                        ha=side, va="center", color=colour,
+                    )  # fmt: skip
+        axes.axvline(0.0, color=style.MUTED, linewidth=0.8)
+        axes.set_yticks(rows, [labels[k] for k in shown])
+        axes.invert_yaxis()
+        axes.set_title(f"Raw signals, {channel.name.replace('/', ', ')}")
+        axes.set_xlabel("recorded minus simulated, in standard deviations of healthy days")
+        if corrected is not None:
+            axes.legend(loc="best", ncols=2)
     return made
 
 

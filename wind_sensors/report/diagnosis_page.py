@@ -7,12 +7,14 @@ from html import escape
 
 import numpy as np
 
+from wind_sensors.diagnosis.decision import REMAINDER_SCORES
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.findings import Estimate, Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
 from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.regions import Found
 from wind_sensors.diagnosis.verdict import Diagnosis
-from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
+from wind_sensors.report.diagnosis_figures import as_svg, residual_figure, statistics_figure
 
 STYLE = """
 :root{--ink:#22303c;--muted:#5d6b77;--line:#e3e8ec;--blue:#1f6fb2;--orange:#b96a1c;--green:#3d7f52}
@@ -31,7 +33,8 @@ code,.eq{font-family:ui-monospace,monospace;font-size:.92em;overflow-wrap:anywhe
 table{border-collapse:collapse;width:100%;font-size:.95rem}
 th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
 th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.scroll{overflow-x:auto}svg{max-width:100%;height:auto}
+.scroll{overflow-x:auto}svg{width:100%;min-width:38rem;height:auto}
+@media(max-width:30rem){table{font-size:.8rem}th,td{padding:.3rem .25rem}}
 .bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
 .bar i{display:block;height:100%;background:var(--blue)}
 """
@@ -127,11 +130,17 @@ def _physics(finding: Finding) -> str:
         f"<th class='n'>95 % interval</th>"
         f"<th>unit</th></tr>{rows}</table></div>"
         f"<p>The mismatch is largest in <b>{escape(region.label)}</b> ({escape(region.channel)}): "
-        f"{number_text(finding.located.excess)} {escape(finding.located.unit)}; "
-        f"p = {finding.p:.3g} "
+        f"{_excess(finding.located)}p = {finding.p:.3g} "
         f"after looking everywhere; {100.0 * finding.share:.0f} % of the whole misfit.</p>"
         "</section>"
     )
+
+
+def _excess(found: Found) -> str:
+    """The mean residual of a region; nothing of what shows in no series."""
+    if found.region.kind in {"frequency", "spectrum", "statistic"}:
+        return ""
+    return f"{number_text(found.excess)} {escape(found.unit)}; "
 
 
 def _proof(finding: Finding) -> str:
@@ -203,14 +212,17 @@ def _left(diagnosis: Diagnosis) -> str:
     unexplained = diagnosis.unexplained
     rows = "".join(
         f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
-        f"<td class='n'>{number_text(f.excess)} {escape(f.unit)}</td>"
-        f"<td class='n'>{number_text(f.score)}</td></tr>"
+        f"<td class='n'>{_excess(f).rstrip('; ')}</td><td class='n'>{number_text(f.score)}</td>"
+        f"<td class='n'>{REMAINDER_SCORES[f.region.kind]:.0f}</td></tr>"
         for f in unexplained.regions[:4]
     )
     return (
         "<section><h2>What is left</h2>"
-        f"<p>p = {unexplained.p:.3g} for the largest remainder.</p><div class='scroll'><table>"
-        "<tr><th>channel</th><th>where</th><th class='n'>residual</th><th class='n'>score</th></tr>"
+        f"<p>p = {unexplained.p:.3g} for the largest remainder. A score is what the fit would gain "
+        "if the residual were moved there; up to the last column it is what healthy days and "
+        "simplified forms leave.</p><div class='scroll'><table>"
+        "<tr><th>channel</th><th>where</th><th class='n'>residual</th><th class='n'>score</th>"
+        "<th class='n'>usual to</th></tr>"
         f"{rows}</table></div></section>"
     )
 
@@ -248,11 +260,16 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         f.region.channel for f in diagnosis.unexplained.regions[:1]
     }
     corrected = diagnosis.corrected if diagnosis.findings else None
-    figures = [
-        as_svg(residual_figure(diagnosis.comparison, diagnosis.simulated, corrected, channel))
-        for channel in diagnosis.comparison.channels
-        if channel.name in wanted
-    ]
+    comparison, simulated = diagnosis.comparison, diagnosis.simulated
+    figures = []
+    for channel in comparison.channels:
+        if channel.name not in wanted:
+            continue
+        figures.append(residual_figure(comparison, simulated, corrected, channel))
+        known = diagnosis.baseline.channels[channel.name]
+        raw = statistics_figure(comparison, known, simulated, corrected, channel)
+        if raw is not None:
+            figures.append(raw)
     healthy = ", ".join(diagnosis.baseline.recordings) or "none"
     body = [
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
@@ -260,8 +277,9 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         f"<h1>{escape(_headline(diagnosis))}</h1>{_summary(diagnosis)}</header>",
         "<section><h2>Before and after</h2>"
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
-        "described. Blue: with the named physics. Bars are two standard errors.</p>"
-        + "".join(figures)
+        "described. Blue: with the named physics. Bars are two standard errors; grey is what "
+        "healthy days show.</p>"
+        + "".join(f"<div class='scroll'>{as_svg(made)}</div>" for made in figures)
         + "</section>",
         *(_physics(f) for f in diagnosis.findings),
         *(_proof(f) for f in diagnosis.findings[:1]),

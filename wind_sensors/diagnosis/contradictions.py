@@ -1,0 +1,154 @@
+"""What contradicts an explanation in its own simulation: effects that undo each other, or vary."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.explanation import Naming
+from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.intervals import cell_signatures
+from wind_sensors.diagnosis.whitening import in_series
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+LEAST_TOGETHER = 0.4
+LEAST_CHANGE = 30.0
+"""Two effects that change a signal must together change it by this share of the sum of what each
+does, in squares, if that is more than the second."""
+
+PARTS = 8
+VARIES = 18.0
+VARIES_SHARE = 0.02
+VARIES_BY_ITSELF = 0.1
+"""What always holds, in a form that is certain, is the same in every part, half and quarter of the
+record, to a tenth of its size (the wind's way from the reference changes by the eddy): a size of its
+own in one of them must not drop the cost by more than the first, or than the second times the
+gain."""
+
+LIVELY_TIME = 5.0
+"""A signal is lively or quiet by how fast it moves within so many seconds."""
+
+UNEVEN = 12.0
+UNEVEN_SHARE = 0.005
+"""An effect has one size, whether its signal is lively or quiet: another one in lively moments must
+not drop the cost by more than this, or than this share of the gain. What refuses jumps, or sticks
+and slips in its own way, is taken for a filter or for friction otherwise."""
+
+
+def undo_each_other(naming: Naming, station: Station) -> bool:
+    """Whether two effects take back on some instrument most of what each does there.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+    """
+    if len(naming.fit.terms) < 2:
+        return False
+    comparison = naming.whitener.comparison
+    weights = comparison.weights(naming.whitener.trust)
+    without = comparison.simulate(station).flat(comparison.channels)
+
+    first, second = naming.fit.terms
+    squares = []
+    for terms in ((first,), (second,), naming.fit.terms):
+        moved = comparison.possible(planted(station, terms))
+        if moved is None:
+            return False
+        change = np.nan_to_num(moved.flat(comparison.channels) - without) * weights
+        squares.append(change**2)
+    n = comparison.coefficients
+    for k in range(len(comparison.channels)):
+        one, other, together = (float(s[k * n : (k + 1) * n].sum()) for s in squares)
+        if one + other > LEAST_CHANGE and together < LEAST_TOGETHER * (one + other):
+            return True
+    return False
+
+
+def varies(naming: Naming, station: Station) -> bool:
+    """Whether an effect that should hold throughout has another size in a part of the record.
+
+    Only a form that is certain can be held to that: others depend on the wind in ways of their own.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    left = null.of(naming.fit.simulated)
+    cuts = np.linspace(0.0, comparison.grid.n * comparison.grid.dt, PARTS + 1)
+    most = max(VARIES, VARIES_SHARE * naming.gain)
+    for term in naming.fit.terms:
+        if term.interval != ALWAYS or term.effect.noisy or not term.effect.exact:
+            continue
+        others = [t for t in naming.fit.terms if t is not term]
+        without = comparison.possible(planted(station, others))
+        if without is None:
+            continue
+        cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
+        cells = null.through_standing(in_series(comparison, cells))
+        for length in (1, 2, 4):
+            parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
+            power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
+            drop = (parts @ left) ** 2 / power
+            if np.any(drop / (1.0 + VARIES_BY_ITSELF**2 * power) > most):
+                return True
+    return False
+
+
+def unevenness(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if an effect had one size while its signals are lively, another while not.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: One of its effects.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    others = [t for t in naming.fit.terms if t is not term]
+    without = comparison.possible(planted(station, others))
+    if without is None:
+        return 0.0
+    n = comparison.coefficients
+    halves = np.zeros((2, n * len(comparison.channels)))
+    for k, channel in enumerate(comparison.channels):
+        name = channel.name
+        change = naming.fit.simulated.series[name] - without.series[name]
+        if not np.any(change):
+            continue
+        trust = null.trust[name]
+        lively = _lively(without.series[name], comparison.grid.dt)
+        for half, weight in zip(halves, (1.0 - lively, lively), strict=True):
+            part = spectra.to_cosine(comparison.masked(change * weight))[:n]
+            half[k * n : (k + 1) * n] = trust.slope / trust.deviation * part
+    left = null.of(naming.fit.simulated)
+    padded = np.pad(halves, ((0, 0), (0, left.size - halves.shape[1])))
+    parts = null.through_standing(padded)
+    power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1e-9)
+    sizes = parts @ left / power
+    return float((sizes[1] - sizes[0]) ** 2 / np.sum(1.0 / power))
+
+
+def _lively(series: FloatArray, dt: float) -> FloatArray:
+    """Weights from nought where a series is quiet to one where it is lively, shape (n,)."""
+    moving = uniform_filter1d(np.gradient(series) ** 2, round(LIVELY_TIME / dt), mode="nearest")
+    rank = np.argsort(np.argsort(moving)) / max(series.size - 1, 1)
+    return np.asarray(np.clip(2.0 * rank - 0.5, 0.0, 1.0))
+
+
+def is_uneven(naming: Naming, station: Station) -> bool:
+    """Whether an effect has another size while its signals are lively than while they are quiet.
+
+    Those whose form is certain are held to one size in all parts of the record instead.
+    """
+    most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
+    return any(
+        unevenness(naming, station, term) > most
+        for term in naming.fit.terms
+        if not term.effect.exact and not term.effect.legible and not term.is_told
+    )
