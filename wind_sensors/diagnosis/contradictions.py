@@ -25,8 +25,8 @@ VARIES = 18.0
 VARIES_SHARE = 0.02
 VARIES_BY_ITSELF = 0.1
 """What always holds, in a form that is certain, is the same in every part, half and quarter of the
-record, to a tenth of its size (the wind's way from the reference changes by the eddy): a size of its
-own in one of them must not drop the cost by more than the first, or than the second times the
+record, to a tenth of its size (the wind's way from the reference changes by the eddy): a size of
+its own in one of them must not drop the cost by more than the first, or than the second times the
 gain."""
 
 LIVELY_TIME = 5.0

@@ -73,7 +73,7 @@ def lag_weights(comparison: Comparison, templates: Sequence[Template]) -> FloatA
 
 
 def misplaced(comparison: Comparison, station: Station, without: Simulated) -> FloatArray:
-    """What the error of the reference's place changes, one standard deviation a row.
+    """What the error of a learnt place of the reference changes, one standard deviation a row.
 
     Its delays follow the wind's direction, so that on a platform they change with the course.
 
@@ -83,14 +83,13 @@ def misplaced(comparison: Comparison, station: Station, without: Simulated) -> F
         without: Its simulation.
 
     Returns:
-        Changes of what is compared, shape (2, l), or (0, l) for a reference at the instruments.
+        Changes of what is compared, shape (2, l), or (0, l) without a known place.
     """
     healthy = without.flat(comparison.channels)
     place = comparison.place
-    error = COMMON_LAG * _separation(comparison) if place is None else place.error
-    if error == 0.0:
+    if place is None:
         return np.zeros((0, healthy.size))
-    shifts = (Place(error, 0.0, 0.0), Place(0.0, error, 0.0))
+    shifts = (Place(place.error, 0.0, 0.0), Place(0.0, place.error, 0.0))
     moved = [comparison.with_reference_at(shift).simulate(station) for shift in shifts]
     return np.array([np.nan_to_num(m.flat(comparison.channels) - healthy) for m in moved])
 
