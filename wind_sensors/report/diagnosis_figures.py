@@ -41,6 +41,11 @@ def as_svg(made: Figure) -> str:
     return content[content.index("<svg") :]
 
 
+def channel_words(name: str) -> str:
+    """A channel for people."""
+    return name.replace("/", ", ").replace("_", " ")
+
+
 def _series(
     comparison: Comparison, simulated: Simulated, corrected: Simulated | None, channel: Channel
 ) -> tuple[FloatArray, FloatArray, str]:
@@ -103,7 +108,7 @@ def residual_figure(
             over_time.plot(cut, _smooth(after, width), color=style.CORRECTED, label="with it")
             over_time.legend(loc="upper right", ncols=2)
         over_time.axhline(0.0, color=style.MUTED, linewidth=0.8)
-        over_time.set_title(f"Recorded minus simulated, {channel.name.replace('/', ', ')}")
+        over_time.set_title(f"Recorded minus simulated, {channel_words(channel.name)}")
         over_time.set_xlabel(f"time in s ({_SMOOTHING:.0f} s means)")
         over_time.set_ylabel(unit)
         speeds = np.quantile(comparison.speed, np.linspace(0.0, 1.0, 9))
@@ -180,7 +185,7 @@ def statistics_figure(
         axes.axvline(0.0, color=style.MUTED, linewidth=0.8)
         axes.set_yticks(rows, [labels[k] for k in shown])
         axes.invert_yaxis()
-        axes.set_title(f"Raw signals, {channel.name.replace('/', ', ')}")
+        axes.set_title(f"Raw signals, {channel_words(channel.name)}")
         axes.set_xlabel("recorded minus simulated, in standard deviations of healthy days")
         if corrected is not None:
             axes.legend(loc="best", ncols=2)

@@ -14,7 +14,12 @@ from wind_sensors.diagnosis.fitting import ALWAYS
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found
 from wind_sensors.diagnosis.verdict import Diagnosis
-from wind_sensors.report.diagnosis_figures import as_svg, residual_figure, statistics_figure
+from wind_sensors.report.diagnosis_figures import (
+    as_svg,
+    channel_words,
+    residual_figure,
+    statistics_figure,
+)
 
 STYLE = """
 :root{--ink:#22303c;--muted:#5d6b77;--line:#e3e8ec;--blue:#1f6fb2;--orange:#b96a1c;--green:#3d7f52}
@@ -33,7 +38,7 @@ code,.eq{font-family:ui-monospace,monospace;font-size:.92em;overflow-wrap:anywhe
 table{border-collapse:collapse;width:100%;font-size:.95rem}
 th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
 th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.scroll{overflow-x:auto}svg{width:100%;min-width:38rem;height:auto}
+.scroll{overflow-x:auto}svg{width:100%;min-width:27rem;height:auto}
 @media(max-width:30rem){table{font-size:.8rem}th,td{padding:.3rem .25rem}}
 .bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
 .bar i{display:block;height:100%;background:var(--blue)}
@@ -129,7 +134,8 @@ def _physics(finding: Finding) -> str:
         f"<div class='scroll'><table><tr><th>parameter</th><th class='n'>value</th>"
         f"<th class='n'>95 % interval</th>"
         f"<th>unit</th></tr>{rows}</table></div>"
-        f"<p>The mismatch is largest in <b>{escape(region.label)}</b> ({escape(region.channel)}): "
+        f"<p>The mismatch is largest in <b>{escape(region.label)}</b> "
+        f"({escape(channel_words(region.channel))}): "
         f"{_excess(finding.located)}p = {finding.p:.3g} "
         f"after looking everywhere; {100.0 * finding.share:.0f} % of the whole misfit.</p>"
         "</section>"
@@ -211,7 +217,7 @@ def _next(diagnosis: Diagnosis) -> str:
 def _left(diagnosis: Diagnosis) -> str:
     unexplained = diagnosis.unexplained
     rows = "".join(
-        f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
+        f"<tr><td>{escape(channel_words(f.region.channel))}</td><td>{escape(f.region.label)}</td>"
         f"<td class='n'>{_excess(f).rstrip('; ')}</td><td class='n'>{number_text(f.score)}</td>"
         f"<td class='n'>{REMAINDER_SCORES[f.region.kind]:.0f}</td></tr>"
         for f in unexplained.regions[:4]

@@ -1,0 +1,76 @@
+"""The report of a diagnosis: what a reader sees of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.observation import STATISTICS, Channel
+from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
+from wind_sensors.report.diagnosis_figures import statistics_figure
+from wind_sensors.report.diagnosis_page import page
+
+
+@lru_cache(maxsize=1)
+def stepped() -> Diagnosis:
+    """Of a vane whose readings come in steps of eight degrees."""
+    steps = {"step": 8.0, "origin": 0.0}
+    planted = with_effect(STATION, catalogue()["quantisation"], "vane", steps)
+    return diagnose(recorded(planted, 71), baseline())
+
+
+def of(diagnosis: Diagnosis, kind: str) -> Channel:
+    return next(c for c in diagnosis.comparison.channels if c.kind == kind)
+
+
+def test_steps_that_move_no_mean_are_drawn_before_and_after() -> None:
+    found = stepped()
+    vane = of(found, "vane_angle")
+    known = found.baseline.channels[vane.name]
+    made = statistics_figure(found.comparison, known, found.simulated, found.corrected, vane)
+    assert made is not None
+    (axes,) = made.axes
+    drawn = {line.get_label(): np.asarray(line.get_xdata()) for line in axes.get_lines()}
+    labels = [text.get_text() for text in axes.get_yticklabels()]
+    steps = labels.index("steps of the readings")
+    assert abs(drawn["before"][steps]) > 4.0
+    assert abs(drawn["with it"][steps]) < 2.0
+    assert set(STATISTICS["vane_angle"]) <= set(labels)
+
+
+def test_what_departs_nowhere_is_not_drawn() -> None:
+    found = stepped()
+    cup = of(found, "rotor_rate")
+    known = found.baseline.channels[cup.name]
+    drawn = statistics_figure(found.comparison, known, found.simulated, found.corrected, cup)
+    assert drawn is None
+
+
+@pytest.mark.parametrize("far", [1e3, -1e3])
+def test_what_departs_too_far_to_be_drawn_is_told_at_the_edge(far: float) -> None:
+    found = stepped()
+    vane = of(found, "vane_angle")
+    known = found.baseline.channels[vane.name]
+    mean = known.statistics_mean.copy()
+    mean[-1] -= far * known.statistics_deviation[-1]
+    moved = replace(known, statistics_mean=mean)
+    made = statistics_figure(found.comparison, moved, found.simulated, None, vane)
+    assert made is not None
+    (axes,) = made.axes
+    assert np.abs(axes.get_lines()[0].get_xdata()).max() <= 40.0
+    (told,) = [t.get_text() for t in axes.texts]
+    assert float(told) == pytest.approx(far, abs=100.0)
+
+
+def test_the_page_tells_name_size_and_what_is_left() -> None:
+    text = page(stepped())
+    assert "<h1>Quantisation (vane)</h1>" in text
+    assert "step 8 deg" in text
+    assert "Raw signals, vane, vane angle" in text
+    assert "usual to" in text
