@@ -74,3 +74,16 @@ def test_the_page_tells_name_size_and_what_is_left() -> None:
     assert "step 8 deg" in text
     assert "Raw signals, vane, vane angle" in text
     assert "usual to" in text
+
+
+def test_the_page_tells_why_a_name_was_withdrawn() -> None:
+    found = stepped()
+    reason = "lever_arm would fit, but with another size in parts of the record"
+    left = replace(found.unexplained, description=f"somewhere; {reason}")
+    withdrawn = replace(
+        found, verdict="unknown", findings=(), unexplained=left, objection=reason
+    )  # fmt: skip
+    text = page(withdrawn)
+    assert reason in text
+    assert "is not borne out" not in text
+    assert "is not borne out" in page(replace(withdrawn, objection=""))

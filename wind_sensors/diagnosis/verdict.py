@@ -64,6 +64,7 @@ class Diagnosis:
         station: The station with the named physics.
         baseline: What was normal.
         comparison, naming, simulated, corrected: For reports.
+        objection: Why what fits best is not named; empty: no name was withdrawn.
     """
 
     recording: str
@@ -79,6 +80,7 @@ class Diagnosis:
     simulated: Simulated = field(repr=False)
     corrected: Simulated = field(repr=False)
     regions_before: tuple[Found, ...] = ()
+    objection: str = ""
     bank: RegionBank | None = field(default=None, repr=False)
 
 
@@ -157,6 +159,39 @@ def _explained(
     return searcher, name(searcher, report("fitting effects"))
 
 
+def _upheld(
+    verdict: Verdict,
+    findings: tuple[Finding, ...],
+    naming: Naming,
+    comparison: Comparison,
+    station: Station,
+) -> tuple[Verdict, tuple[Finding, ...], str]:
+    """Verdict and findings after what speaks against them, and what does, for people."""
+    if not findings:
+        return verdict, (), ""
+    names = " and ".join(t.effect.name for t in naming.fit.terms)
+    left: Verdict = "unknown"
+    if not borne_out(findings):
+        left = "unknown" if stands_out(findings) else "none"
+        objection = "blocks that were not fitted do not bear it out"
+    elif passes_unseen(findings, naming.gain):
+        left = "unknown" if stands_out(findings) else "none"
+        objection = "only for a part of the record, where nothing stands out"
+    elif made_up(findings, comparison):
+        objection = "the data do not show the one without the other"
+    elif undo_each_other(naming, station):
+        objection = "each would have to undo what the other does"
+    elif varies(naming, station):
+        objection = "with another size in parts of the record"
+    elif is_uneven(naming, station):
+        objection = "with another size in lively minutes than in quiet ones"
+    elif not determined(findings, naming.gain):
+        objection = "of any size, nought among them"
+    else:
+        return verdict, findings, ""
+    return left, (), f"{names} would fit, but {objection}"
+
+
 def diagnose(
     recording: Recording,
     baseline: Baseline,
@@ -215,22 +250,7 @@ def diagnose(
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
-    objection = ""
-    if not borne_out(findings):
-        objection = "blocks that were not fitted do not bear it out"
-    elif passes_unseen(findings, naming.gain):
-        objection = "only for a part of the record, where nothing stands out"
-    if objection:
-        refuted_names = ", ".join(f.term.effect.name for f in findings)
-        verdict, findings = ("unknown" if stands_out(findings) else "none"), ()
-    made = (
-        made_up(findings, comparison)
-        or undo_each_other(naming, baseline.station)
-        or varies(naming, baseline.station)
-        or is_uneven(naming, baseline.station)
-    )
-    if findings and (made or not determined(findings, naming.gain)):
-        verdict, findings = "unknown", ()
+    verdict, findings, objection = _upheld(verdict, findings, naming, comparison, baseline.station)
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)
@@ -244,7 +264,6 @@ def diagnose(
     if calm:
         description = too_calm(baseline)
     if objection:
-        objection = f"{refuted_names} would fit, but {objection}"
         description = f"{description}; {objection}" if description else objection
     return Diagnosis(
         recording=recording.name,
@@ -260,5 +279,6 @@ def diagnose(
         simulated=searcher.bank.without,
         corrected=naming.fit.simulated if named else searcher.bank.without,
         regions_before=tuple(before),
+        objection=objection,
         bank=bank,
     )

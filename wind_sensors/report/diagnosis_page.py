@@ -104,7 +104,7 @@ def _summary(diagnosis: Diagnosis) -> str:
         nearest = " and ".join(
             f"{words(t.effect.name)} ({t.instrument})" for t in diagnosis.naming.fit.terms
         )
-        if nearest:
+        if nearest and not diagnosis.objection:
             lines.append(
                 f"<p class='muted'>What comes nearest, {escape(nearest)}, is not borne out: it "
                 "leaves more than a healthy day does, or needs a second effect that does not "
