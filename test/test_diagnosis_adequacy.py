@@ -20,7 +20,6 @@ from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.search import searcher_of
-from wind_sensors.diagnosis.spectra import to_cosine
 from wind_sensors.diagnosis.support import borne_out, determined, made_up, passes_unseen
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.diagnosis.whitening import form_signatures, trust_of, unstanding
@@ -144,29 +143,6 @@ def test_a_vane_that_counts_the_other_way_round_is_read_on_one_turn() -> None:
     away = (comparison.measured.series[name] - right.series[name]) / comparison.speed
     assert np.abs(comparison.measured.series[name] / comparison.speed).max() > np.pi
     assert np.abs(away).max() < np.pi
-
-
-def test_of_a_certain_form_less_is_put_down_to_the_form() -> None:
-    # The same change of the cup by two names: a gain is the same at all speeds, ice need not be.
-    comparison = prepare(recorded(STATION, 64))
-    searcher = searcher_of(comparison, baseline(), catalogue(), {})
-    null = searcher.whitener(searcher.bank.without)
-    name = "cup/rotor_rate"
-    rank = np.argsort(np.argsort(comparison.speed)) / comparison.grid.n
-    middling = np.clip(1.0 - np.abs(3.0 * rank - 1.5), 0.0, 1.0)
-    left = {}
-    for effect, values in (
-        ("calibration_drift", {"gain": 0.8}),
-        ("icing", {"gain": 0.8, "inertia_factor": 1.0}),
-    ):
-        term = Term(catalogue()[effect], "cup", values)
-        named = fit(null, STATION, [term], None, iterations=0)
-        change = named.simulated.series[name] - searcher.bank.without.series[name]
-        row = np.zeros(comparison.weights(null.trust).size)
-        row[: comparison.coefficients] = to_cosine(change * middling)[: comparison.coefficients]
-        adequate = searcher.whitener(searcher.bank.without, named)
-        left[effect] = float(np.linalg.norm(adequate.of_changes(row)))
-    assert left["calibration_drift"] > 1.5 * left["icing"]
 
 
 def test_the_form_of_no_change_is_no_signature() -> None:

@@ -23,11 +23,9 @@ does, in squares, if that is more than the second."""
 PARTS = 8
 VARIES = 18.0
 VARIES_SHARE = 0.02
-VARIES_BY_ITSELF = 0.1
 """What always holds, in a form that is certain, is the same in every part, half and quarter of the
-record, to a tenth of its size (the wind's way from the reference changes by the eddy): a size of
-its own in one of them must not drop the cost by more than the first, or than the second times the
-gain."""
+record: a size of its own in one of them must not drop the cost by more than this, or than this
+share of the gain."""
 
 LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
@@ -94,8 +92,7 @@ def varies(naming: Naming, station: Station) -> bool:
         for length in (1, 2, 4):
             parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
             power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
-            drop = (parts @ left) ** 2 / power
-            if np.any(drop / (1.0 + VARIES_BY_ITSELF**2 * power) > most):
+            if np.any((parts @ left) ** 2 / power > most):
                 return True
     return False
 

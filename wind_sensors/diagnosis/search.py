@@ -30,8 +30,6 @@ from wind_sensors.diagnosis.signatures import (
     with_larger,
 )
 from wind_sensors.diagnosis.whitening import (
-    CERTAIN_FORM_ERROR,
-    FORM_ERROR,
     Whitener,
     form_signatures,
     trust_of,
@@ -130,11 +128,7 @@ class Searcher:
         standing = np.concatenate((standing, np.ones(len(lag))))
         means = np.concatenate((means, np.zeros(len(lag))))
         if named is not None:
-            certain = all(term.effect.exact for term in named.terms)
-            form = form_signatures(
-                self.comparison, trust, self.bank.without, named.simulated,
-                CERTAIN_FORM_ERROR if certain else FORM_ERROR,
-            )  # fmt: skip
+            form = form_signatures(self.comparison, trust, self.bank.without, named.simulated)
             signatures = np.concatenate((signatures, form))
             standing = np.concatenate((standing, np.ones(len(form))))
             means = np.concatenate((means, np.zeros(len(form))))

@@ -133,10 +133,6 @@ class Whitener:
 FORM_ERROR = 0.1
 """Standard deviation, relative to a named effect's own signature, of what its true form adds to
 the simulated one: in each part of the wind's range, each band, each statistic."""
-
-CERTAIN_FORM_ERROR = 0.03
-"""The same of effects whose form is certain: a gain is a gain in any wind."""
-
 _FORM_BANDS = (0.0, 0.01, 0.05, 0.2, 1.25)
 
 
@@ -145,7 +141,6 @@ def form_signatures(
     trust: Mapping[str, Trust],
     without: Simulated,
     corrected: Simulated,
-    error: float = FORM_ERROR,
 ) -> FloatArray:
     """How a named effect may differ in form from its simulation, one possibility a row.
 
@@ -158,7 +153,6 @@ def form_signatures(
         trust: Noise of each channel.
         without: Simulation without the named effects.
         corrected: Simulation with them.
-        error: One standard deviation, relative to the change that the effects make.
 
     Returns:
         Noise-whitened differences, each of one standard deviation, shape (k, m).
@@ -174,7 +168,7 @@ def form_signatures(
         if float(values @ values) < 1e-2:
             return
         row = np.zeros(starts[-1])
-        row[starts[place] : starts[place + 1]] = error * values
+        row[starts[place] : starts[place + 1]] = FORM_ERROR * values
         rows.append(row)
 
     for k, channel in enumerate(comparison.channels):
