@@ -42,11 +42,6 @@ LEAST_REMAINDER = 0.01
 times its share of what there was to explain is more than the second, and that share more than the
 third: of a large effect the form may leave more."""
 
-RIVAL_SHARE = 0.2
-RIVAL_SCORE = 0.5
-"""A smaller remainder, of this part of the score, with this share of it says as much: it rivals
-what was named."""
-
 REMAINDER_P = 0.05
 """Nor does a remainder count that a healthy day shows with more probability."""
 
@@ -168,7 +163,6 @@ def verdict_of(
         return "none"
     sizeable = share > max(REMAINDER_SHARE / max(remainder.score, 1e-9), LEAST_REMAINDER)
     clear = remainder.score > REMAINDER_SCORE and sizeable
-    rivals = remainder.score > RIVAL_SCORE and share > RIVAL_SHARE
-    if (p < REMAINDER_P and (clear or rivals)) or _patchwork(naming):
+    if (p < REMAINDER_P and clear) or _patchwork(naming):
         return "unknown"
     return "ambiguous" if equal else "named"
