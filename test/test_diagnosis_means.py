@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.means.healthy import learn_means
 from wind_sensors.diagnosis.means.mean_response import mean_speed
 from wind_sensors.errors import UserError
 from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
+from wind_sensors.report.outcome_page import outcome_page
 from wind_sensors.station.model import Cup, Station, Vane
 from wind_sensors.station.parameters import rotor_parameters
 from wind_sensors.station.signals import Angles, Pulses, Recording, Series
@@ -176,6 +177,9 @@ def test_a_tower_wake_is_found_at_its_bearing() -> None:
     assert wake.term.values["depth"] == pytest.approx(0.19, abs=0.03)
     assert wake.proof is not None
     assert wake.proof.excess_removed > 0.8
+    text = outcome_page(outcome)
+    assert "<h1>Wake shadow (one_b)</h1>" in text
+    assert "<div class='scroll'><svg" in text
 
 
 def test_other_heights_say_which_of_two_cups_has_changed() -> None:

@@ -33,12 +33,12 @@ _FURTHEST = 40.0
 
 
 def as_svg(made: Figure) -> str:
-    """A figure as an SVG element for a page."""
+    """A figure for a page, as SVG that is scrolled where the page is too narrow to read it."""
     text = io.StringIO()
     with style.house():
         made.savefig(text, format="svg", metadata={"Date": None})
     content = text.getvalue()
-    return content[content.index("<svg") :]
+    return f"<div class='scroll'>{content[content.index('<svg') :]}</div>"
 
 
 def channel_words(name: str) -> str:

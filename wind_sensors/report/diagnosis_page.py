@@ -285,7 +285,7 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
         "described. Blue: with the named physics. Bars are two standard errors; grey is what "
         "healthy days show.</p>"
-        + "".join(f"<div class='scroll'>{as_svg(made)}</div>" for made in figures)
+        + "".join(as_svg(made) for made in figures)
         + "</section>",
         *(_physics(f) for f in diagnosis.findings),
         *(_proof(f) for f in diagnosis.findings[:1]),

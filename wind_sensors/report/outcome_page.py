@@ -10,7 +10,13 @@ from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.report import style
 from wind_sensors.report.diagnosis_figures import as_svg
-from wind_sensors.report.diagnosis_page import STYLE, VERDICTS, estimate_text, number_text, words
+from wind_sensors.report.diagnosis_page import (
+    VERDICTS,
+    document,
+    estimate_text,
+    number_text,
+    words,
+)
 
 
 def panel_figure(panels: list[Panel]) -> Figure:
@@ -109,9 +115,4 @@ def outcome_page(outcome: Outcome) -> str:
         f"<section><h2>What is left</h2><p>{escape(left)}</p></section>",
         _list("The smallest sizes that this recording would have shown", detectable),
     ]
-    return (
-        "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
-        "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<title>Diagnosis of {escape(outcome.recording)}</title><style>{STYLE}</style></head>"
-        f"<body><main>{''.join(body)}</main></body></html>\n"
-    )
+    return document(f"Diagnosis of {outcome.recording}", "".join(body))
