@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
+from scipy.stats import ttest_1samp
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.baseline import Baseline
@@ -14,6 +16,8 @@ from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.reference_lag import is_a_way_of_the_wind
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
 
 ACCEPTED_GAIN = 14.0
 """Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
@@ -77,6 +81,12 @@ SMALLEST_TOLD = 0.4
 SMALLEST_BESIDE = 1.8
 """The same beside another effect on the same signals, whose form a small one may make good."""
 
+STEADY_TIME = 15.0
+STEADY_P = 0.02
+"""What begins or ends inside the record gains again and again while it holds: the mean gain of
+parts of so many seconds differs from nought by Student's test at this level. A gust that the
+reference missed brings as much, at once."""
+
 LONGEST_MOMENT = 0.25
 OF_A_MOMENT = 0.7
 """An effect of which more than the second share shows in a part of the record that is no longer
@@ -127,8 +137,60 @@ def brought(
         if current.terms
         else no_terms(whitener, searcher)
     )
+    if not is_steady(searcher, before, candidate.fit):
+        return -np.inf
     gain = total(before) - total(candidate.fit) - single_event(searcher, before, candidate.fit)
     return min(gain, before_evidence - candidate.evidence)
+
+
+def needs_to_be_steady(term: Term) -> bool:
+    """Whether a term begins or ends inside the record and acts all the time in between."""
+    effect = term.effect
+    seldom = effect.legible or effect.noisy or effect.occasional
+    return term.interval != ALWAYS and not seldom
+
+
+def is_steady(searcher: Searcher, before: Fit, after: Fit) -> bool:
+    """Whether the newest term gains again and again while it holds, if it should.
+
+    Args:
+        searcher: The search.
+        before, after: Two explanations in the same null.
+    """
+    newest = after.terms[-1]
+    if not needs_to_be_steady(newest):
+        return True
+    comparison = searcher.comparison
+    width = round(STEADY_TIME / comparison.grid.dt)
+    gains = gain_in_parts(searcher, before, after, width)
+    middle = (np.arange(gains.size) + 0.5) * width * comparison.grid.dt
+    at = middle + comparison.drive.elapsed
+    begin, end = newest.interval
+    inside = gains[(at > begin) & (at < (np.inf if end is None else end))]
+    if inside.size < 2:
+        return False
+    return float(ttest_1samp(inside, 0.0, alternative="greater").pvalue) < STEADY_P
+
+
+def gain_in_parts(searcher: Searcher, before: Fit, after: Fit, width: int) -> FloatArray:
+    """How much of a gain each part of the record brings, statistics aside.
+
+    Args:
+        searcher: The search.
+        before, after: Two explanations in the same null.
+        width: Of a part, in bins.
+    """
+    comparison = searcher.comparison
+    n = comparison.coefficients
+    parts = comparison.grid.n // width
+    gain = np.zeros(parts)
+    for k in range(len(comparison.channels)):
+        for sign, fitted in ((1.0, before), (-1.0, after)):
+            white = np.zeros(comparison.grid.n)
+            white[:n] = fitted.vector[k * n : (k + 1) * n]
+            squares = spectra.from_cosine(white)[: parts * width] ** 2
+            gain += sign * squares.reshape(parts, width).sum(axis=1)
+    return gain
 
 
 def single_event(searcher: Searcher, before: Fit, after: Fit) -> float:
@@ -146,20 +208,11 @@ def single_event(searcher: Searcher, before: Fit, after: Fit) -> float:
     passing = newest.interval != ALWAYS
     if newest.effect.occasional and not passing:
         return 0.0
-    comparison = searcher.comparison
-    n = comparison.coefficients
-    gain = np.zeros(MOMENTS)
-    width = comparison.grid.n // MOMENTS
-    for k in range(len(comparison.channels)):
-        for sign, fitted in ((1.0, before), (-1.0, after)):
-            white = np.zeros(comparison.grid.n)
-            white[:n] = fitted.vector[k * n : (k + 1) * n]
-            squares = spectra.from_cosine(white)[: MOMENTS * width] ** 2
-            gain += sign * squares.reshape(MOMENTS, width).sum(axis=1)
+    gain = gain_in_parts(searcher, before, after, searcher.comparison.grid.n // MOMENTS)[:MOMENTS]
     together = 1 if passing else EVENT
     around = np.convolve(gain, np.ones(together), "same")
     best = int(np.argmax(around))
-    elsewhere = np.abs(np.arange(MOMENTS) - best) >= together
+    elsewhere = np.abs(np.arange(gain.size) - best) >= together
     return float(max(around[best] - max(np.max(around[elsewhere]), 0.0), 0.0))
 
 

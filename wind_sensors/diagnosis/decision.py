@@ -8,14 +8,16 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from wind_sensors.diagnosis.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.explanation import Alternative, Naming
-from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.fitting import ALWAYS, planted
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.regions import RegionBank
+from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,6 +52,14 @@ VERY_NOISY = 8.0
 """Noise beyond this many standard deviations of healthy days is physics that a name left out;
 without any name, where a reference of another day may err more, beyond the second."""
 
+STIRRED = 0.01
+STIRRED_TIME = 5.0
+"""Where an effect with eddies of its own changes a signal by more than this share of its largest
+change, and so many seconds before and after, a residual's noise says nothing."""
+
+LEAST_UNSTIRRED = 0.15
+"""Share of the record that must be left for its noise to be judged."""
+
 MOST_FREE_PARAMETERS = 2
 CERTAIN_GAIN = 50.0
 """An explanation with more parameters that brings less than this must also stand out somewhere in
@@ -80,7 +90,7 @@ def remainder_of(
     """What is left in the channels that the named effects reach.
 
     What another instrument shows beside them says nothing against the names, nor does what a
-    healthy day shows as loudly.
+    healthy day shows as loudly, nor the power of eddies if they bring some of their own.
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
@@ -90,7 +100,12 @@ def remainder_of(
             for instrument in comparison.affected(comparison.recording.station, term.instrument)
         }
         channels = {c.name for c in comparison.channels if c.instrument in reached}
-        scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
+        stirred = any(term.effect.stirs for term in naming.fit.terms)
+        counts = [
+            r.channel in channels and not (stirred and r.kind in {"frequency", "spectrum"})
+            for r in bank.regions
+        ]
+        scores = np.where(counts, scores, 0.0)
     loudest = {
         c.name: LOUDEST_FACTOR * baseline.loudness(c.instrument) for c in comparison.channels
     }
@@ -110,6 +125,32 @@ def with_own_noise(naming: Naming) -> set[str]:
         if term.effect.noisy
         for instrument in comparison.affected(comparison.station, term.instrument)
     }
+
+
+def unstirred(naming: Naming, station: Station) -> Comparison | None:
+    """The comparison without the seconds in which named effects bring eddies of their own.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+
+    Returns:
+        None: too little of the record is left.
+    """
+    comparison = naming.whitener.comparison
+    stirring = [t for t in naming.fit.terms if t.effect.stirs]
+    if not stirring:
+        return comparison
+    others = [t for t in naming.fit.terms if not t.effect.stirs]
+    without = comparison.simulate(planted(station, others))
+    acts = np.zeros(comparison.grid.n, dtype=np.bool_)
+    for channel in comparison.channels:
+        change = np.abs(naming.fit.simulated.series[channel.name] - without.series[channel.name])
+        acts |= change > STIRRED * max(float(change.max()), 1e-9)
+    width = round(2.0 * STIRRED_TIME / comparison.grid.dt)
+    calm = 1.0 - maximum_filter1d(acts.astype(float), 2 * width)
+    outside = uniform_filter1d(calm, width)
+    return comparison.within(outside) if np.mean(outside) > LEAST_UNSTIRRED else None
 
 
 def is_noisy(naming: Naming, excess: Excess) -> bool:

@@ -107,6 +107,17 @@ def evidence(candidate: Fit, whitener: Whitener) -> float:
     return whitener.deviance(candidate.simulated) + penalty
 
 
+def in_own_noise(searcher: Searcher, candidate: Fit, named: Fit | None = None) -> float:
+    """Evidence of a fit in the null that it leaves, where it is.
+
+    Args:
+        searcher: The search.
+        candidate: A fit in whatever null.
+        named: Effects that are taken for granted, in a form that need not be exact.
+    """
+    return evidence(candidate, searcher.whitener(candidate.simulated, named))
+
+
 @dataclass(frozen=True)
 class Judged:
     """A fit in the null that it leaves itself.

@@ -114,10 +114,16 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
 
 
 def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
-    """Explanations that fit as well with one effect exchanged: its position, the explanation."""
+    """Explanations that fit as well with one effect exchanged: its position, the explanation.
+
+    One with more parameters could follow what the simulation is inexact about: if it is behind all
+    the same, only the likelihood speaks for it. What contains an effect and fits no better adds
+    something to it that the recording does not show.
+    """
     own = [t.key for t in naming.fit.terms]
     share = EQUAL_SHARE if len(own) == 1 else 0.0
-    limit = max(2.0 * EQUAL_LIKELIHOOD, min(share * naming.gain, LARGEST_EQUAL))
+    likely = 2.0 * EQUAL_LIKELIHOOD
+    inexact = max(likely, min(share * naming.gain, LARGEST_EQUAL))
     seen = set(own)
     out: list[tuple[int, Alternative]] = []
     for alternative in naming.alternatives:
@@ -125,6 +131,10 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
         missing = [k for k, key in enumerate(own) if key not in theirs]
         if len(theirs) != len(own) or len(missing) != 1 or theirs[-1] in seen:
             continue
+        newest, rival = alternative.fit.terms[-1], naming.fit.terms[missing[0]]
+        if rival.effect.name in newest.effect.contains and alternative.behind > 0.0:
+            continue
+        limit = likely if alternative.fit.active > naming.fit.active else inexact
         if alternative.behind < limit and _alike(naming, alternative):
             seen.add(theirs[-1])
             out.append((missing[0], alternative))

@@ -23,10 +23,10 @@ from wind_sensors.diagnosis.explanation import (
     Judged,
     Naming,
     evidence,
+    in_own_noise,
     judged,
     no_terms,
     seen_in,
-    total,
 )
 from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
@@ -325,23 +325,24 @@ def _greedy(
             fits = [f for f in singles if f.terms[0].effect.name not in excluded]
         else:
             fits = _further_fits(searcher, whitener, current, excluded)
-        fits = sorted((f for f in fits if plausible(f)), key=total)
+        # Noise and coherence were judged with the mismatch still in them: each competes in the null
+        # that it leaves itself.
+        costs = [(in_own_noise(searcher, f, named), f) for f in fits if plausible(f)]
+        costs.sort(key=lambda pair: pair[0])
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
+        so_far = evidence(current, whitener)
         if not any(
-            total(current) - total(f)
-            >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
-            for f in fits
+            so_far - cost >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
+            for cost, f in costs
         ):
             break
-        # Noise and coherence were judged with the mismatch still in them: the best few compete,
-        # each in the null that it leaves itself.
-        best = total(fits[0])
-        reach = FAR_BEHIND * (total(current) - best)
+        best = costs[0][0]
+        reach = FAR_BEHIND * (so_far - best)
         pool = [
             f
-            for place, f in enumerate(fits)
-            if f.terms[-1].is_told or (place < FINALISTS and total(f) - best <= reach)
+            for place, (cost, f) in enumerate(costs)
+            if f.terms[-1].is_told or (place < FINALISTS and cost - best <= reach)
         ]
         ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
         ranked.sort(key=_not_told)

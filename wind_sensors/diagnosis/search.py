@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import calm_share
@@ -241,13 +242,16 @@ class Searcher:
         best = ranked[0][0]
         close = CLOSE_START * float(whitener.of(self.bank.without).size)
         tried = [k for deviance, k in ranked[:TRIED_STARTS] if smooths or deviance <= best + close]
-        fits = [
-            fit(
-                whitener, self.station, [*fixed, starts[k]], rest, FIRST_ITERATIONS, current,
-                ROUGHLY,
-            )
-            for k in tried
-        ]  # fmt: skip
+        if current is not None and self._is_apart(current, starts[0]):
+            fits = [self._fit_beside(whitener, current, starts[k]) for k in tried]
+        else:
+            fits = [
+                fit(
+                    whitener, self.station, [*fixed, starts[k]], rest, FIRST_ITERATIONS, current,
+                    ROUGHLY,
+                )
+                for k in tried
+            ]  # fmt: skip
         ahead = fits[0]
         if len(fits) > 1 and smooths:
             ahead = min(fits, key=lambda f: self.whitener(f.simulated).deviance(f.simulated))
@@ -255,6 +259,36 @@ class Searcher:
             ahead = min(fits, key=lambda f: f.cost)
         return fit(
             whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
+        )
+
+    def _is_apart(self, current: Fit, start: Term) -> bool:
+        """Whether a term acts on signals that those of a fit do not reach."""
+        reached = {
+            name
+            for term in current.terms
+            for name in self.comparison.affected(self.station, term.instrument)
+        }
+        return not reached & set(self.comparison.affected(self.station, start.instrument))
+
+    def _fit_beside(self, whitener: Whitener, current: Fit, start: Term) -> Fit:
+        """Fit of one more term on signals of its own, the others as they are.
+
+        Fitted with it, what is drawn at random (additional pulses) would cost by chance more than
+        the new term gains.
+        """
+        station = planted(self.station, current.terms)
+        alone = fit(
+            whitener, station, [start], current.simulated, FIRST_ITERATIONS, least=ROUGHLY
+        )
+        slopes = None
+        if current.slopes is not None and alone.slopes is not None:
+            slopes = np.hstack((current.slopes, alone.slopes))
+        return replace(
+            alone,
+            terms=(*current.terms, *alone.terms),
+            covariance=block_diag(current.covariance, alone.covariance),
+            active=current.active + alone.active,
+            slopes=slopes,
         )
 
     def fit_all(

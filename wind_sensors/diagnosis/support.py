@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from wind_sensors.diagnosis.acceptance import needs_to_be_steady
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
@@ -54,7 +55,7 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
 def passes_unseen(findings: tuple[Finding, ...], gain: float) -> bool:
     """Whether something is said to begin or end inside the record that stands out nowhere.
 
-    Of the many intervals some fit the swings of a healthy vane; but none brings much.
+    Only what acts now and then is held to that: what acts all the time has to gain all the time.
 
     Args:
         findings: What is said.
@@ -63,6 +64,7 @@ def passes_unseen(findings: tuple[Finding, ...], gain: float) -> bool:
     return gain < UNSEEN_GAIN and any(
         f.term.interval != ALWAYS
         and not f.term.effect.legible
+        and not needs_to_be_steady(f.term)
         and f.proof is not None
         and not _shows(f)
         for f in findings

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.decision import (
     Verdict,
     is_noisy,
     remainder_of,
+    unstirred,
     verdict_of,
     with_own_noise,
 )
@@ -28,7 +29,7 @@ from wind_sensors.diagnosis.findings import Finding, Unexplained, equal_explanat
 from wind_sensors.diagnosis.fitting import planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
-from wind_sensors.diagnosis.noise_level import described, excess_of
+from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
 from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
 from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
@@ -159,6 +160,15 @@ def _explained(
     return searcher, name(searcher, report("fitting effects"))
 
 
+def _noise_left(naming: Naming, baseline: Baseline) -> Excess:
+    """How far the residual's noise exceeds that of healthy days, where that can be judged."""
+    apart = unstirred(naming, baseline.station)
+    if apart is None:
+        return Excess()
+    simulated = apart.simulate(planted(baseline.station, naming.fit.terms))
+    return excess_of(apart, simulated, baseline, with_own_noise(naming))
+
+
 def _upheld(
     verdict: Verdict,
     findings: tuple[Finding, ...],
@@ -238,7 +248,7 @@ def diagnose(
     detectable = smallest_detectable(searcher, whitener)
     equal = equal_explanations(naming)
     located_p = bank.p_value(max(f.score for f in before))
-    excess = excess_of(comparison, naming.fit.simulated, baseline, with_own_noise(naming))
+    excess = _noise_left(naming, baseline)
     verdict = verdict_of(naming, equal, remainder, detectable, located_p, excess)
     calm = is_too_calm(comparison, baseline) and verdict != "none" and (
         not naming.fit.terms or need_calibration(naming.fit.terms)

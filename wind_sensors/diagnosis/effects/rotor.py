@@ -215,9 +215,7 @@ DAMAGED_CUP = Effect(
     ),
     applies=_is_rotor,
     update=_damage,
-    templates=(
-        {"torque_harmonic": 0.03, "gain": 1.0},
-    ),
+    templates=({"torque_harmonic": 0.03, "gain": 1.0}, {"torque_harmonic": 0.0, "gain": 0.98}),
     confusable={
         "encoder_slot_error": "turn the rotor by hand: slot errors stay, the torque does not",
         "calibration_drift": "pulse intervals against rotor angle",

@@ -44,6 +44,7 @@ WAKE_SHADOW = Effect(
     region="a sector of wind directions, all speeds",
     standing=0.06,
     occasional=True,
+    stirs=True,
     parameters=(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),
         Parameter("depth", "1", 0.0, 0.95, minimum=0.05),
