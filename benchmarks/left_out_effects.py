@@ -23,9 +23,9 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.signatures import Template, signature_bank, templates_of
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.recordings import read_recording

@@ -10,13 +10,13 @@ from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.acceptance import PASSING_FORM_GAIN, PASSING_GAIN, passing_gain
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.contradictions import is_uneven
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import judged
 from wind_sensors.diagnosis.findings import Estimate, Finding
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.search import searcher_of

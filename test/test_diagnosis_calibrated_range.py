@@ -12,10 +12,11 @@ from wind_sensors.diagnosis.calibrated_range import (
     need_calibration,
     slowest_wind,
 )
-from wind_sensors.diagnosis.comparison import Comparison, prepare
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.diagnosis.learning import default_baseline, learn
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation.run import simulate
 from wind_sensors.simulation.scenario import Scenario

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.intervals import interval_gains
 from wind_sensors.diagnosis.onsets import refined_interval
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import searcher_of
 
 CELLS = 7

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from representatives import represented
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.comparison import BANDS, prepare
+from wind_sensors.diagnosis.comparison import BANDS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import (
@@ -20,6 +20,7 @@ from wind_sensors.diagnosis.observation import (
     step_statistics,
     stillness_statistics,
 )
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Angles, Pulses, erratic

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.fitting import Term, fit, planted
 from wind_sensors.diagnosis.moves import simplified
 from wind_sensors.diagnosis.pairs import promise
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 

@@ -14,11 +14,12 @@ from test_diagnosis_naming import STATION, recorded
 
 from wind_sensors.cli.baseline import told_place
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import Comparison, prepare
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.diagnosis.learning import default_baseline, learn
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.reference_lag import is_a_way_of_the_wind, misplaced
 from wind_sensors.diagnosis.reference_place import Place, delayed
 from wind_sensors.diagnosis.reference_search import located, pooled

@@ -10,7 +10,6 @@ from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 
 from wind_sensors.diagnosis.acceptance import is_its_moment, overlap
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
@@ -19,6 +18,7 @@ from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
 from wind_sensors.diagnosis.naming import explaining_what_stands_out
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.signatures import LARGER

@@ -11,8 +11,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from wind_sensors.cli.baseline import learnt, read_baseline
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.regions import region_bank, strongest
 from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.errors import UserError

@@ -13,23 +13,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.counted_time import (
-    slow_departure,
-    where_reference_is,
-    where_vanes_follow,
-)
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.observation import (
     LOWEST_BAND_FREQUENCY,
     NORMALISED_BANDS,
-    SERIES_INTERVAL,
     Channel,
     Grid,
     angle_series,
-    channels_of,
     erratic_statistics,
     interval_statistics,
     rate_series,
@@ -37,9 +29,10 @@ from wind_sensors.diagnosis.observation import (
     stillness_statistics,
 )
 from wind_sensors.diagnosis.reference_place import Place, delayed
+from wind_sensors.diagnosis.turning import where_vanes_follow
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import wrap
-from wind_sensors.simulation.drive import Drive, drive_from_recording
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.memory import DriveMemory, Memory
 from wind_sensors.simulation.pulses import rotor_signals
@@ -56,15 +49,8 @@ HIGHEST_FREQUENCY = 1.25
 LOW_END = 0.02
 """Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
 
-SHORTEST = 60.0
-"""A recording needs this much time in common with its reference [s]."""
-
 FASTEST = 60.0
 """A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
-
-DIRECTION_TIME = 60.0
-SPEED_TIME = 10.0
-"""Direction and speed are slow ones over these times [s]."""
 
 SIMULATIONS = 64
 """So many simulated channels are kept: a station that is tried again is not simulated again."""
@@ -430,97 +416,3 @@ class Comparison:
             full[: difference.size] = difference
             out[name] = spectra.from_cosine(full)
         return out
-
-
-def prepare(
-    recording: Recording, station: Station | None = None, place: Place | None = None
-) -> Comparison:
-    """Prepare a recording for comparison.
-
-    Args:
-        recording: With a reference wind.
-        station: Station to compare with; None: the recording's own.
-        place: Where the reference stands; None: unknown, its wind counts as that at the sensors.
-
-    Raises:
-        UserError: There is no reference, or too little of anything.
-    """
-    known = recording.station if station is None else station
-    drive = drive_from_recording(recording)
-    seconds = (len(drive) - 1) * drive.dt
-    if seconds < SHORTEST:
-        raise UserError(
-            f"Only {seconds:.0f} s of reference wind: too little to compare anything.",
-            recording.name,
-            f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
-        )
-    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
-    channels = tuple(
-        c
-        for c in channels_of(known)
-        if c.instrument in (recording.pulses if c.kind == "rotor_rate" else recording.angles)
-    )
-    if not channels:
-        raise UserError(
-            "No instrument of the station has signals in the recording.",
-            recording.name,
-            "Check the topics in the station file with `wind info`.",
-        )
-    first = known.instrument(channels[0].instrument)
-    flow = WindAtSensors(known, drive).flow(first).wind
-    if place is not None:
-        drive = delayed(drive, flow, place)
-        flow = WindAtSensors(known, drive).flow(first).wind
-    at = np.arange(len(drive)) * drive.dt
-    coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
-    speed = np.hypot(flow[:, 0], flow[:, 1])
-
-    def slowly(values: FloatArray, seconds: float) -> FloatArray:
-        width = min(int(seconds / drive.dt), values.size - 1) | 1
-        return np.interp(grid.centres, at, uniform_filter1d(values, width, mode="mirror"))
-
-    x, y = slowly(flow[:, 0], DIRECTION_TIME), slowly(flow[:, 1], DIRECTION_TIME)
-    slow_direction = np.unwrap(np.arctan2(-y, -x))
-    slow_speed = slowly(speed, SPEED_TIME)
-    empty = Simulated({}, {}, {})
-    comparison = Comparison(
-        recording=recording,
-        station=known,
-        drive=drive,
-        grid=grid,
-        channels=channels,
-        direction=slow_direction,
-        speed=np.maximum(slow_speed, 0.5),
-        wind_from=np.interp(grid.centres, at, coming_from),
-        measured=empty,
-        place=place,
-        memory=DriveMemory(drive),
-    )
-    comparison = replace(comparison, expected=_expected(comparison))
-    known_wind = where_reference_is(recording, grid)
-    beside = _beside_expected(comparison)
-    departure = {name: slow_departure(angle, grid) for name, angle in beside.items()}
-    comparison = replace(comparison, departure=departure)
-    followed = where_vanes_follow(beside.values(), grid)
-    if not known_wind.all() or not followed.all():
-        return comparison.within(known_wind * followed)
-    return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
-
-
-def _expected(comparison: Comparison) -> dict[str, FloatArray]:
-    """Simulated deviation of each vane from the slow direction [rad]."""
-    _, angles = comparison.signals(comparison.station)
-    return {
-        c.name: angle_series(angles[c.instrument], comparison.direction, comparison.grid)
-        for c in comparison.channels
-        if c.kind == "vane_angle"
-    }
-
-
-def _beside_expected(comparison: Comparison) -> dict[str, FloatArray]:
-    """Measured minus simulated angle of each vane [rad], by channel name."""
-    seen = comparison.observe({}, comparison.recording.angles).series
-    return {
-        name: series / comparison.speed - comparison.expected[name]
-        for name, series in seen.items()
-    }

@@ -16,11 +16,12 @@ from wind_sensors.diagnosis.baseline import (
     default_channel,
     statistics_prior,
 )
-from wind_sensors.diagnosis.comparison import LOW_END, Comparison, prepare
+from wind_sensors.diagnosis.comparison import LOW_END, Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, with_effect
 from wind_sensors.diagnosis.noise_level import learnt_levels, levels
 from wind_sensors.diagnosis.observation import channels_of
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.reference_lag import lag_weights
 from wind_sensors.diagnosis.reference_search import located
 from wind_sensors.diagnosis.screening import is_possible, scores_of

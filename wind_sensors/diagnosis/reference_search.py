@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import channels_of
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.reference_lag import SINGLE_LAG
 from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.diagnosis.whitening import trust_of

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration, too_calm
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, prepare
+from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.contradictions import is_uneven, undo_each_other, varies
 from wind_sensors.diagnosis.decision import (
     REMAINDER_P,
@@ -30,6 +30,7 @@ from wind_sensors.diagnosis.fitting import planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
 from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
+from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
 from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
