@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.explanation import (
     judged,
     no_terms,
     parameter_cost,
+    seen_in,
     total,
 )
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term
@@ -37,6 +38,13 @@ FloatArray = npt.NDArray[np.float64]
 
 FITTED_PAIRS = 3
 """So many of the most promising pairs are fitted."""
+
+SEVERAL = 2
+SIMPLE_SHARE = 0.4
+BUILT_PAIRS = 2
+BESIDE_CANDIDATES = 4
+"""An effect of so many parameters is challenged by pairs built on the best simple effects that
+explain this share of it, each with the best of so many beside it."""
 
 SMALLEST_SHARE = 0.3
 LARGEST_SHARE = 2.5
@@ -60,6 +68,7 @@ def better_pair(
         for terms in promising_pairs(searcher, whitener, singles, current)
         if not leading & {term.key for term in terms}
     ][:FITTED_PAIRS]
+    pairs += built_on_simple(searcher, whitener, singles, current)
     if not pairs:
         return None
     leader, *_ = judged(searcher, [current])
@@ -74,6 +83,51 @@ def better_pair(
     if best.fit.active > leader.fit.active:
         margin = max(ACCEPTED_FURTHER_GAIN, margin)
     return best if best.evidence < leader.evidence - margin else None
+
+
+def built_on_simple(
+    searcher: Searcher, whitener: Whitener, singles: Sequence[Fit], current: Fit
+) -> list[list[Term]]:
+    """Pairs of a simple effect that explains much by itself and what fits best beside it.
+
+    Where one effect with several parameters leads, an effect of which the simple one hides the
+    direction (a lean beside an offset) promises nothing by itself.
+
+    Args:
+        searcher: The search.
+        whitener: The null in which `singles` were fitted.
+        singles: Fits of single effects.
+        current: What leads.
+    """
+    if len(current.terms) > 1 or current.active < SEVERAL:
+        return []
+    leading = current.terms[0].key
+    nothing = total(no_terms(whitener, searcher))
+    led = nothing - total(seen_in(whitener, current))
+    simple = [
+        f
+        for f in sorted(singles, key=total)
+        if f.active == 1
+        and f.terms[0].interval == ALWAYS
+        and f.terms[0].key != leading
+        and plausible(f)
+        and nothing - total(f) > SIMPLE_SHARE * led
+    ]
+    found: list[list[Term]] = []
+    for first in simple[:BUILT_PAIRS]:
+        null = searcher.whitener(first.simulated)
+        base = seen_in(null, first)
+        candidates = [
+            starts
+            for starts in searcher.single_candidates(
+                null, base.vector, BESIDE_CANDIDATES, blind=True
+            )
+            if starts[0].key != leading and may_join(starts[0], first.terms)
+        ]
+        beside = [f for f in searcher.fit_all(null, base, candidates) if plausible(f)]
+        if beside:
+            found.append(list(min(beside, key=total).terms))
+    return found
 
 
 def promising_pairs(

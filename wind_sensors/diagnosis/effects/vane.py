@@ -116,6 +116,11 @@ def _imbalance(entry: Entry, values: Values) -> dict[str, Any]:
     }
 
 
+MOST_LEAN_DEG = 6.0
+"""In each direction: gravity turns a vane on a mast that looks upright. More would deflect the flow
+along the vane, which is another effect."""
+
+
 def _has_no_attitude(drive: Drive) -> bool:
     """Whether nothing tells how the mount leans: a carrier reports it."""
     return drive.motion is None
@@ -134,8 +139,8 @@ VANE_IMBALANCE = Effect(
             "imbalance", "1/m", -40.0, 40.0, minimum=0.15, step=0.05,
             starts=(0.5, -0.5, 2.5, -2.5),
         ),
-        Parameter("tilt_x", "deg", -15.0, 15.0, step=0.5, free=_has_no_attitude),
-        Parameter("tilt_y", "deg", -15.0, 15.0, step=0.5, free=_has_no_attitude),
+        Parameter("tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
+        Parameter("tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
     ),
     applies=_is_vane,
     update=_imbalance,
