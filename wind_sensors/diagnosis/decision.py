@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from wind_sensors.diagnosis.acceptance import LOUDEST_FACTOR
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.acceptance import EVENT, LOUDEST_FACTOR, MOMENTS
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.explanation import Alternative, Naming
@@ -90,9 +91,13 @@ def remainder_of(
     """What is left in the channels that the named effects reach.
 
     What another instrument shows beside them says nothing against the names, nor does what a
-    healthy day shows as loudly, nor the power of eddies if they bring some of their own.
+    healthy day shows as loudly, nor the power of eddies if they bring some of their own. Nor does one
+    event, if the effects always hold and act again and again.
     """
-    scores = bank.scores(naming.adequate.of(naming.fit.simulated))
+    left = naming.adequate.of(naming.fit.simulated)
+    if all(t.interval == ALWAYS and not t.effect.occasional for t in naming.fit.terms):
+        left = _without_an_event(comparison, left) if naming.fit.terms else left
+    scores = bank.scores(left)
     if naming.fit.terms:
         reached = {
             instrument
@@ -111,9 +116,25 @@ def remainder_of(
     }
     limits = np.array([max(REMAINDER_SCORES[r.kind], loudest[r.channel]) for r in bank.regions])
     worst = int(np.argmax(scores / limits))
-    left = float(scores[worst])
-    share = left / (left + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
-    return Remainder(left / float(limits[worst]), bank.p_value(left), share)
+    score = float(scores[worst])
+    share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
+    return Remainder(score / float(limits[worst]), bank.p_value(score), share)
+
+
+def _without_an_event(comparison: Comparison, white: FloatArray) -> FloatArray:
+    """A white vector without the part of the record in which each channel's is largest."""
+    out = white.copy()
+    n = comparison.coefficients
+    width = comparison.grid.n // MOMENTS
+    for k in range(len(comparison.channels)):
+        padded = np.zeros(comparison.grid.n)
+        padded[:n] = white[k * n : (k + 1) * n]
+        series = spectra.from_cosine(padded)
+        squares = (series[: MOMENTS * width] ** 2).reshape(MOMENTS, width).sum(axis=1)
+        first = int(np.argmax(np.convolve(squares, np.ones(EVENT), "valid")))
+        series[first * width : (first + EVENT) * width] = 0.0
+        out[k * n : (k + 1) * n] = spectra.to_cosine(series)[:n]
+    return out
 
 
 def with_own_noise(naming: Naming) -> set[str]:

@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import EQUAL_SHARE, Alternative, Naming
-from wind_sensors.diagnosis.fitting import Fit, Term, planted
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, planted
 from wind_sensors.diagnosis.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, strongest
+
+FloatArray = npt.NDArray[np.float64]
 
 EQUAL_LIKELIHOOD = 3.0
 """Explanations whose log-likelihoods lie closer are reported together."""
@@ -44,7 +48,8 @@ class Finding:
     Attributes:
         term: The effect with its values and interval.
         parameters: With intervals, by name.
-        located: Where the mismatch shows most.
+        located: Where the mismatch shows most; of what begins or ends inside the record, beside
+            the other effects.
         share: Share of the whole misfit that the effect removes.
         p: Probability of the location's score on a healthy day.
         alternatives: Other effects and how far their log-likelihood lies behind.
@@ -182,12 +187,14 @@ def findings_of(
     out = []
     for k, term in enumerate(naming.fit.terms):
         rest = [t for t in naming.fit.terms if t is not term]
-        if rest:
-            vector = whitener.of_station(planted(baseline.station, rest))
-            gain = float(vector @ vector) - naming.fit.cost
-        else:
-            gain = naming.gain
-        own = _location(naming, bank, before, term)
+        beside = whitener.comparison.simulate(planted(baseline.station, rest))
+        vector = whitener.of(beside) if rest else naming.nothing
+        gain = float(vector @ vector) - naming.fit.cost
+        passing = term.interval != ALWAYS
+        own = _location(
+            naming, bank, vector if passing else naming.nothing,
+            beside if passing else whitener.comparison.simulate(baseline.station), term,
+        ) or before[0]  # fmt: skip
         share = gain / max(misfit - 0.95 * naming.nothing.size, gain)
         out.append(
             Finding(
@@ -210,19 +217,23 @@ def findings_of(
     return tuple(out)
 
 
-def _location(naming: Naming, bank: RegionBank, before: list[Found], term: Term) -> Found:
-    """The strongest region in a channel of the term's instrument."""
+def _location(
+    naming: Naming, bank: RegionBank, vector: FloatArray, simulated: Simulated, term: Term
+) -> Found | None:
+    """The strongest region in a channel of the term's instrument.
+
+    Args:
+        naming: The explanation.
+        bank: Regions.
+        vector: White vector of what is to be explained.
+        simulated: Simulation without it.
+        term: One of the explanation's.
+    """
     comparison = naming.whitener.comparison
     channels = {
         c.name
         for c in comparison.channels
         if c.instrument in comparison.affected(comparison.station, term.instrument)
     }
-    every = strongest(
-        naming.whitener, bank, naming.nothing,
-        comparison.simulate(comparison.station), len(bank.regions),
-    )  # fmt: skip
-    for found in every:
-        if found.region.channel in channels:
-            return found
-    return before[0]
+    every = strongest(naming.whitener, bank, vector, simulated, len(bank.regions))
+    return next((found for found in every if found.region.channel in channels), None)

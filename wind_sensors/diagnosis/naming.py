@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.explanation import (
     judged,
     no_terms,
     seen_in,
+    total,
 )
 from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
@@ -50,7 +51,7 @@ BROAD_PARAMETERS = 3
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
 FINALISTS = 7
-CONTENDERS = 4
+CONTENDERS = 5
 FAR_BEHIND = 0.8
 """Fits that miss more than this share of the leader's gain do not compete with it."""
 
@@ -325,25 +326,11 @@ def _greedy(
             fits = [f for f in singles if f.terms[0].effect.name not in excluded]
         else:
             fits = _further_fits(searcher, whitener, current, excluded)
-        # Noise and coherence were judged with the mismatch still in them: each competes in the null
-        # that it leaves itself.
-        costs = [(in_own_noise(searcher, f, named), f) for f in fits if plausible(f)]
-        costs.sort(key=lambda pair: pair[0])
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
-        so_far = evidence(current, whitener)
-        if not any(
-            so_far - cost >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
-            for cost, f in costs
-        ):
+        pool = _finalists(searcher, whitener, current, [f for f in fits if plausible(f)], named)
+        if not pool:
             break
-        best = costs[0][0]
-        reach = FAR_BEHIND * (so_far - best)
-        pool = [
-            f
-            for place, (cost, f) in enumerate(costs)
-            if f.terms[-1].is_told or (place < FINALISTS and cost - best <= reach)
-        ]
         ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
         ranked.sort(key=_not_told)
         ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
@@ -374,6 +361,43 @@ def _greedy(
     if progress:
         progress(1.0)
     return _settled(searcher, current, alternatives, screened)
+
+
+def _finalists(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    fits: Sequence[Fit],
+    named: Fit | None,
+) -> list[Fit]:
+    """The fits that may win, in the null of the terms so far or in that which each leaves itself.
+
+    In the former, noise and coherence were judged with the mismatch still in them.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        fits: With one term more each.
+        named: The terms so far; None: there are none.
+    """
+    found: dict[int, Fit] = {k: f for k, f in enumerate(fits) if f.terms[-1].is_told}
+    own = [in_own_noise(searcher, f, named) for f in fits]
+    worth = False
+    for costs, so_far in (
+        ([total(f) for f in fits], total(current)),
+        (own, evidence(current, whitener)),
+    ):
+        order = np.argsort(costs, kind="stable")[:FINALISTS]
+        best = min(costs, default=so_far)
+        for k in order:
+            if costs[k] - best <= FAR_BEHIND * (so_far - best):
+                found[int(k)] = fits[k]
+        worth = worth or any(
+            so_far - cost >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
+            for cost, f in zip(costs, fits, strict=True)
+        )
+    return list(found.values()) if worth else []
 
 
 def _settled(

@@ -23,9 +23,11 @@ OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
 nothing up or down."""
 
-UNSEEN_GAIN = 200.0
+UNSEEN_GAIN = 100.0
+UNSEEN_NOISY_GAIN = 200.0
 """What begins or ends inside the record and brings more need not stand out in a region: what
-changes the quick part of a signal moves none up or down."""
+changes the quick part of a signal moves none up or down. The second of what acts now and then
+only, and so need not gain all the time."""
 
 PASSING_P = 0.02
 """It stands out below this probability: of the many intervals that were tried one fits a gust."""
@@ -55,18 +57,18 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
 def passes_unseen(findings: tuple[Finding, ...], gain: float) -> bool:
     """Whether something is said to begin or end inside the record that stands out nowhere.
 
-    Only what acts now and then is held to that: what acts all the time has to gain all the time.
+    Of the many intervals some fit the swings of a healthy vane; but none brings much.
 
     Args:
         findings: What is said.
         gain: Drop of the cost by all of it.
     """
-    return gain < UNSEEN_GAIN and any(
+    return any(
         f.term.interval != ALWAYS
         and not f.term.effect.legible
-        and not needs_to_be_steady(f.term)
         and f.proof is not None
         and not _shows(f)
+        and f.share * gain < (UNSEEN_GAIN if needs_to_be_steady(f.term) else UNSEEN_NOISY_GAIN)
         for f in findings
     )
 
