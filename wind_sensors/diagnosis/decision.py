@@ -91,12 +91,13 @@ def remainder_of(
     """What is left in the channels that the named effects reach.
 
     What another instrument shows beside them says nothing against the names, nor does what a
-    healthy day shows as loudly, nor the power of eddies if they bring some of their own. Nor does one
-    event, if the effects always hold and act again and again.
+    healthy day shows as loudly, nor the power of eddies if they bring some of their own, nor one
+    event if they always hold and act again and again.
     """
     left = naming.adequate.of(naming.fit.simulated)
-    if all(t.interval == ALWAYS and not t.effect.occasional for t in naming.fit.terms):
-        left = _without_an_event(comparison, left) if naming.fit.terms else left
+    again = all(t.interval == ALWAYS and not t.effect.occasional for t in naming.fit.terms)
+    if naming.fit.terms and again:
+        left = _without_an_event(comparison, left)
     scores = bank.scores(left)
     if naming.fit.terms:
         reached = {
@@ -123,7 +124,7 @@ def remainder_of(
 
 def _without_an_event(comparison: Comparison, white: FloatArray) -> FloatArray:
     """A white vector without the part of the record in which each channel's is largest."""
-    out = white.copy()
+    out: FloatArray = white.copy()
     n = comparison.coefficients
     width = comparison.grid.n // MOMENTS
     for k in range(len(comparison.channels)):
