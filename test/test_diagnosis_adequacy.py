@@ -262,10 +262,10 @@ def test_a_name_needs_a_size_that_is_not_nought(low: float, high: float, known: 
     )
     # Where only a product of two parameters shows, neither interval is narrow.
     for one, gain, enough in ((large, 40.0, known), (small, 400.0, known), (large, 400.0, True)):
-        assert determined((one,), gain) is enough
+        assert determined((replace(one, gain=gain),)) is enough
     # What is there or is not has no size to determine.
     swapped = _finding("sensor_swap", "vane", 0.9, 0.002)
-    assert determined((swapped,), 40.0)
+    assert determined((replace(swapped, gain=40.0),))
 
 
 @pytest.mark.parametrize(
@@ -299,11 +299,11 @@ def test_what_begins_or_ends_must_stand_out(
     effect: tuple[str, str], interval: tuple[float, float | None], p: float, unseen: bool
 ) -> None:
     found = _finding(*effect, 0.9, p)
-    passing = replace(found, term=replace(found.term, interval=interval))
-    assert passes_unseen((passing,), 60.0) is unseen
-    assert not passes_unseen((passing,), 600.0)
+    passing = replace(found, term=replace(found.term, interval=interval), gain=60.0)
+    assert passes_unseen((passing,)) is unseen
+    assert not passes_unseen((replace(passing, gain=600.0),))
     # A rival in an ambiguous set needs no place of its own.
-    assert not passes_unseen((replace(passing, proof=None),), 60.0)
+    assert not passes_unseen((replace(passing, proof=None),))
 
 
 def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:

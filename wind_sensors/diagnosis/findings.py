@@ -55,6 +55,7 @@ class Finding:
         alternatives: Other effects and how far their log-likelihood lies behind.
         proof: On held-out blocks; None for a member of an ambiguous set that did not win.
         set_number: Number of the ambiguous set it belongs to, 0 for none.
+        gain: Drop of the cost by the effect beside the others; 0 where no cost is fitted.
     """
 
     term: Term
@@ -65,6 +66,7 @@ class Finding:
     alternatives: tuple[tuple[str, str, float], ...]
     proof: Proof | None
     set_number: int = 0
+    gain: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -200,7 +202,7 @@ def findings_of(
             Finding(
                 term, estimates[k], own, float(np.clip(share, 0.0, 1.0)),
                 bank.p_value(own.score), behind, proof,
-                k + 1 if any(position == k for position, _ in equal) else 0,
+                k + 1 if any(position == k for position, _ in equal) else 0, gain,
             )
         )  # fmt: skip
     for position, alternative in equal:
@@ -211,7 +213,7 @@ def findings_of(
             Finding(
                 term, values, rival.located, rival.share, rival.p,
                 ((rival.term.effect.name, rival.term.instrument, -0.5 * alternative.behind),),
-                None, position + 1,
+                None, position + 1, rival.gain,
             )
         )  # fmt: skip
     return tuple(out)

@@ -54,21 +54,17 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
     return together and sum(f.share for f in own) > MOST_SHARED
 
 
-def passes_unseen(findings: tuple[Finding, ...], gain: float) -> bool:
+def passes_unseen(findings: tuple[Finding, ...]) -> bool:
     """Whether something is said to begin or end inside the record that stands out nowhere.
 
     Of the many intervals some fit the swings of a healthy vane; but none brings much.
-
-    Args:
-        findings: What is said.
-        gain: Drop of the cost by all of it.
     """
     return any(
         f.term.interval != ALWAYS
         and not f.term.effect.legible
         and f.proof is not None
         and not _shows(f)
-        and f.share * gain < (UNSEEN_GAIN if needs_to_be_steady(f.term) else UNSEEN_NOISY_GAIN)
+        and f.gain < (UNSEEN_GAIN if needs_to_be_steady(f.term) else UNSEEN_NOISY_GAIN)
         for f in findings
     )
 
@@ -87,18 +83,14 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     return seldom and stands_out(findings) and proof.excess_removed >= rival
 
 
-def determined(findings: tuple[Finding, ...], gain: float) -> bool:
+def determined(findings: tuple[Finding, ...]) -> bool:
     """Whether the data tell, of every effect named, at least one size that is not nought.
 
     Of a vane out of balance on a mast at rest they tell the product with the lean, so that neither
     has a narrow interval; what brings much and is large is not nought for all that.
-
-    Args:
-        findings: What is said.
-        gain: Drop of the cost by all of it.
     """
     return all(
-        _has_a_size(f) or (f.share * gain > SURE_GAIN and f.term.relative_size > SURE_SIZE)
+        _has_a_size(f) or (f.gain > SURE_GAIN and f.term.relative_size > SURE_SIZE)
         for f in findings
         if f.proof is not None
     )

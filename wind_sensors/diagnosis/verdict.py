@@ -185,7 +185,7 @@ def _upheld(
     if not borne_out(findings):
         left = "unknown" if stands_out(findings) else "none"
         objection = "blocks that were not fitted do not bear it out"
-    elif passes_unseen(findings, naming.gain):
+    elif passes_unseen(findings):
         left = "unknown" if stands_out(findings) else "none"
         objection = "only for a part of the record, where nothing stands out"
     elif made_up(findings, comparison):
@@ -196,7 +196,7 @@ def _upheld(
         objection = "with another size in parts of the record"
     elif is_uneven(naming, station):
         objection = "with another size in lively minutes than in quiet ones"
-    elif not determined(findings, naming.gain):
+    elif not determined(findings):
         objection = "of any size, nought among them"
     else:
         return verdict, findings, ""
