@@ -11,8 +11,9 @@ from test_diagnosis_naming import STATION, baseline, recorded
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.fitting import Term, fit, planted
+from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.moves import simplified
-from wind_sensors.diagnosis.pairs import promise
+from wind_sensors.diagnosis.pairs import built_on_simple, promise
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
@@ -70,3 +71,48 @@ def test_of_a_healthy_rotor_no_ice_is_left() -> None:
     null = searcher.whitener(searcher.bank.without)
     ice = Term(catalogue()["icing"], "cup", {"gain": 0.97, "inertia_factor": 1.01})
     assert simplified(searcher, null, fit(null, STATION, [ice], None, iterations=0)).terms == ()
+
+
+def test_a_pair_is_built_on_a_simple_effect_that_hides_the_other() -> None:
+    """Beside an offset of the vane a leaning axis promises nothing until the offset is there."""
+    effects = catalogue()
+    terms = [
+        Term(effects["vane_offset"], "vane", {"offset": 4.0}),
+        Term(effects["axis_tilt"], "station", {"tilt_x": 20.0, "tilt_y": -12.0}),
+    ]
+    recording = recorded(planted(STATION, terms), 72, swing=0.6)
+    searcher = searcher_of(
+        comparison := prepare(recording), baseline(), effects, guesses_of(comparison, STATION)
+    )
+    null = searcher.whitener(searcher.bank.without)
+    offset = Term(effects["vane_offset"], "vane", {"offset": 3.0})
+    flow = {"cosine_1": -0.02, "sine_1": 0.02, "cosine_2": 0.02, "sine_2": 0.02, "deflection": 1.0}
+    distorted = Term(effects["flow_distortion"], "station", flow)
+    simple, leader = (fit(null, STATION, [t], None) for t in (offset, distorted))
+    assert leader.active > 1
+    (built,) = built_on_simple(searcher, null, [simple, leader], leader)
+    assert {t.effect.name for t in built} == {"vane_offset", "axis_tilt"}
+    # Of one parameter that leads nothing is imitated.
+    assert built_on_simple(searcher, null, [simple, leader], simple) == []
+
+
+def test_a_term_on_other_signals_leaves_the_first_one_alone() -> None:
+    effects = catalogue()
+    bounce = {"bounce_probability": 0.05, "bounce_delay": 0.002}
+    terms = [
+        Term(effects["extra_pulses"], "cup", bounce),
+        Term(effects["vane_offset"], "vane", {"offset": 4.0}),
+    ]
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, terms), 73)), baseline(), effects, {}
+    )
+    null = searcher.whitener(searcher.bank.without)
+    first = fit(null, STATION, [terms[0]], searcher.bank.without)
+    start = Term(effects["vane_offset"], "vane", {"offset": 2.0})
+    assert searcher.is_apart(first, start)
+    both = searcher.fit_beside(null, first, start)
+    assert both.terms[0] == first.terms[0]
+    assert both.terms[1].values["offset"] == pytest.approx(4.0, abs=0.5)
+    assert both.cost < first.cost - 50.0
+    again = Term(effects["calibration_drift"], "cup", {"gain": 1.02})
+    assert not searcher.is_apart(first, again)

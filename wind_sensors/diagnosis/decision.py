@@ -56,7 +56,7 @@ without any name, where a reference of another day may err more, beyond the seco
 STIRRED = 0.01
 STIRRED_TIME = 5.0
 """Where an effect with eddies of its own changes a signal by more than this share of its largest
-change, and so many seconds before and after, a residual's noise says nothing."""
+change, and for twice as many seconds before and after, a residual's noise says nothing."""
 
 LEAST_UNSTIRRED = 0.15
 """Share of the record that must be left for its noise to be judged."""
@@ -97,7 +97,7 @@ def remainder_of(
     left = naming.adequate.of(naming.fit.simulated)
     again = all(t.interval == ALWAYS and not t.effect.occasional for t in naming.fit.terms)
     if naming.fit.terms and again:
-        left = _without_an_event(comparison, left)
+        left = without_an_event(comparison, left)
     scores = bank.scores(left)
     if naming.fit.terms:
         reached = {
@@ -122,7 +122,7 @@ def remainder_of(
     return Remainder(score / float(limits[worst]), bank.p_value(score), share)
 
 
-def _without_an_event(comparison: Comparison, white: FloatArray) -> FloatArray:
+def without_an_event(comparison: Comparison, white: FloatArray) -> FloatArray:
     """A white vector without the part of the record in which each channel's is largest."""
     out: FloatArray = white.copy()
     n = comparison.coefficients

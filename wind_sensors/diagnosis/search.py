@@ -242,8 +242,8 @@ class Searcher:
         best = ranked[0][0]
         close = CLOSE_START * float(whitener.of(self.bank.without).size)
         tried = [k for deviance, k in ranked[:TRIED_STARTS] if smooths or deviance <= best + close]
-        if current is not None and self._is_apart(current, starts[0]):
-            fits = [self._fit_beside(whitener, current, starts[k]) for k in tried]
+        if current is not None and self.is_apart(current, starts[0]):
+            fits = [self.fit_beside(whitener, current, starts[k]) for k in tried]
         else:
             fits = [
                 fit(
@@ -261,7 +261,7 @@ class Searcher:
             whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
         )
 
-    def _is_apart(self, current: Fit, start: Term) -> bool:
+    def is_apart(self, current: Fit, start: Term) -> bool:
         """Whether a term acts on signals that those of a fit do not reach."""
         reached = {
             name
@@ -270,7 +270,7 @@ class Searcher:
         }
         return not reached & set(self.comparison.affected(self.station, start.instrument))
 
-    def _fit_beside(self, whitener: Whitener, current: Fit, start: Term) -> Fit:
+    def fit_beside(self, whitener: Whitener, current: Fit, start: Term) -> Fit:
         """Fit of one more term on signals of its own, the others as they are.
 
         Fitted with it, what is drawn at random (additional pulses) would cost by chance more than

@@ -1,0 +1,126 @@
+"""What begins or ends inside a record, what happens once in it, and what brings its own eddies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.acceptance import is_steady
+from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.decision import unstirred, without_an_event
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.explanation import Alternative, Naming, no_terms
+from wind_sensors.diagnosis.findings import equal_explanations
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit
+from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.search import Searcher, searcher_of
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def searcher() -> Searcher:
+    return searcher_of(prepare(recorded(STATION, 71)), baseline(), catalogue(), {})
+
+
+def in_first_channel(comparison: Comparison, series: FloatArray, size: int) -> FloatArray:
+    """A white vector of which the first channel's series is given."""
+    out = np.zeros(size)
+    out[: comparison.coefficients] = spectra.to_cosine(series)[: comparison.coefficients]
+    return out
+
+
+def drift(interval: Interval = ALWAYS) -> Term:
+    return Term(catalogue()["calibration_drift"], "cup", {"gain": 1.03}, interval)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "steady"), [(60.0, 240.0, True), (140.0, 152.0, False)]
+)
+def test_what_passes_gains_all_the_time_that_it_holds(
+    searcher: Searcher, begin: float, end: float, steady: bool
+) -> None:
+    comparison = searcher.comparison
+    nothing = no_terms(searcher.whitener(searcher.bank.without), searcher)
+    at = comparison.grid.centres + comparison.drive.elapsed
+    noise = np.random.default_rng(3).standard_normal(comparison.grid.n)
+    misfit = np.where((at > begin) & (at < end), np.sqrt(180.0 / (end - begin)), 0.0)
+
+    def seen(series: FloatArray, term: Term) -> Fit:
+        vector = in_first_channel(comparison, series, nothing.vector.size)
+        return replace(nothing, terms=(term,), vector=vector, cost=float(vector @ vector))
+
+    passing = drift((50.0, 250.0))
+    before, after = seen(noise + misfit, passing), seen(noise, passing)
+    assert before.cost > after.cost + 50.0
+    assert is_steady(searcher, before, after) is steady
+    # What always holds is judged by its best moment, what is drawn at random not at all.
+    assert is_steady(searcher, before, seen(noise, drift()))
+    bounce = {"bounce_probability": 0.02, "bounce_delay": 0.001}
+    drawn = Term(catalogue()["extra_pulses"], "cup", bounce, (50.0, 250.0))
+    assert is_steady(searcher, before, seen(noise, drawn))
+
+
+def test_one_event_is_left_out_of_a_remainder(searcher: Searcher) -> None:
+    comparison = searcher.comparison
+    size = no_terms(searcher.whitener(searcher.bank.without), searcher).vector.size
+    at = comparison.grid.centres
+    everywhere = 0.2 * np.sin(2.0 * np.pi * at / 7.0)
+    once = np.where(np.abs(at - 150.0) < 5.0, 5.0 * np.sin(2.0 * np.pi * at / 4.0), 0.0)
+    event = in_first_channel(comparison, everywhere + once, size)
+    steady = in_first_channel(comparison, everywhere, size)
+    left = without_an_event(comparison, event)
+    assert float(left @ left) < 1.1 * float(steady @ steady)
+    kept = without_an_event(comparison, steady)
+    assert 0.8 * float(steady @ steady) < float(kept @ kept) <= float(steady @ steady)
+
+
+def named(searcher: Searcher, term: Term, alternatives: tuple[Alternative, ...] = ()) -> Naming:
+    null = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(null, searcher)
+    one = fit(null, STATION, [term], None, iterations=0)
+    return Naming(one, null, null, nothing.vector, 1000.0, alternatives)
+
+
+def test_noise_is_judged_outside_a_wake(searcher: Searcher) -> None:
+    comparison = searcher.comparison
+    bearing = float(np.degrees(np.quantile(comparison.wind_from, 0.001)))
+    values = {"bearing_from": bearing, "depth": 0.3, "width": 3.0, "flank": 0.0}
+    wake = Term(catalogue()["wake_shadow"], "cup", values)
+    away = np.angle(np.exp(1j * (comparison.wind_from - np.radians(bearing))))
+    outside = unstirred(named(searcher, wake), STATION)
+    assert outside is not None
+    assert outside.mask is not None
+    assert np.all(outside.mask[np.abs(away) < np.radians(3.0)] < 0.01)
+    assert np.mean(outside.mask) > 0.15
+    assert unstirred(named(searcher, drift()), STATION) is comparison
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "active", "behind", "equal"),
+    [
+        ("calibration_offset", {"offset": 0.2}, 1, 20.0, True),
+        ("calibration_offset", {"offset": 0.2}, 2, 20.0, False),
+        ("calibration_offset", {"offset": 0.2}, 2, 4.0, True),
+        ("damaged_cup", {"torque_harmonic": 0.0, "gain": 1.03}, 2, 1.0, False),
+        ("damaged_cup", {"torque_harmonic": 0.0, "gain": 1.03}, 2, -1.0, True),
+    ],
+)
+def test_a_rival_with_more_parameters_has_to_fit_as_well(
+    searcher: Searcher,
+    effect: str,
+    values: dict[str, float],
+    active: int,
+    behind: float,
+    equal: bool,
+) -> None:
+    drifted = named(searcher, drift())
+    drifted = replace(drifted, fit=replace(drifted.fit, active=1))
+    rival = replace(drifted.fit, terms=(Term(catalogue()[effect], "cup", values),), active=active)
+    found = equal_explanations(replace(drifted, alternatives=(Alternative(rival, behind),)))
+    assert [a.fit.terms[0].effect.name for _, a in found] == ([effect] if equal else [])
