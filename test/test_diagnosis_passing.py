@@ -10,13 +10,13 @@ import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.acceptance import is_steady
 from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.decision import unstirred, without_an_event
+from wind_sensors.diagnosis.decision import unstirred
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explanation import Alternative, Naming, no_terms
 from wind_sensors.diagnosis.findings import equal_explanations
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit
+from wind_sensors.diagnosis.moments import is_steady, without_an_event
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 
@@ -58,12 +58,12 @@ def test_what_passes_gains_all_the_time_that_it_holds(
     passing = drift((50.0, 250.0))
     before, after = seen(noise + misfit, passing), seen(noise, passing)
     assert before.cost > after.cost + 50.0
-    assert is_steady(searcher, before, after) is steady
+    assert is_steady(comparison, before, after) is steady
     # What always holds is judged by its best moment, what is drawn at random not at all.
-    assert is_steady(searcher, before, seen(noise, drift()))
+    assert is_steady(comparison, before, seen(noise, drift()))
     bounce = {"bounce_probability": 0.02, "bounce_delay": 0.001}
     drawn = Term(catalogue()["extra_pulses"], "cup", bounce, (50.0, 250.0))
-    assert is_steady(searcher, before, seen(noise, drawn))
+    assert is_steady(comparison, before, seen(noise, drawn))
 
 
 def test_one_event_is_left_out_of_a_remainder(searcher: Searcher) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 
-from wind_sensors.diagnosis.acceptance import is_its_moment, overlap
+from wind_sensors.diagnosis.acceptance import overlap
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.explanation import Judged, Naming, no_terms
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
+from wind_sensors.diagnosis.moments import is_its_moment
 from wind_sensors.diagnosis.naming import explaining_what_stands_out
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.screening import scores_of

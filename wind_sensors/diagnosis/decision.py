@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.acceptance import EVENT, LOUDEST_FACTOR, MOMENTS
+from wind_sensors.diagnosis.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.explanation import Alternative, Naming
 from wind_sensors.diagnosis.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.moments import without_an_event
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.regions import RegionBank
 from wind_sensors.station.model import Station
@@ -120,22 +120,6 @@ def remainder_of(
     score = float(scores[worst])
     share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
     return Remainder(score / float(limits[worst]), bank.p_value(score), share)
-
-
-def without_an_event(comparison: Comparison, white: FloatArray) -> FloatArray:
-    """A white vector without the part of the record in which each channel's is largest."""
-    out: FloatArray = white.copy()
-    n = comparison.coefficients
-    width = comparison.grid.n // MOMENTS
-    for k in range(len(comparison.channels)):
-        padded = np.zeros(comparison.grid.n)
-        padded[:n] = white[k * n : (k + 1) * n]
-        series = spectra.from_cosine(padded)
-        squares = (series[: MOMENTS * width] ** 2).reshape(MOMENTS, width).sum(axis=1)
-        first = int(np.argmax(np.convolve(squares, np.ones(EVENT), "valid")))
-        series[first * width : (first + EVENT) * width] = 0.0
-        out[k * n : (k + 1) * n] = spectra.to_cosine(series)[:n]
-    return out
 
 
 def with_own_noise(naming: Naming) -> set[str]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from wind_sensors.diagnosis.acceptance import needs_to_be_steady
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
+from wind_sensors.diagnosis.moments import needs_to_be_steady
 
 SHOWN_P = 0.05
 """An effect shows if a healthy day has a mismatch as clear where it acts with less probability."""
