@@ -1,4 +1,4 @@
-"""What begins or ends inside a record, what happens once in it, and what brings its own eddies."""
+"""What begins or ends inside a record, what brings eddies of its own, and what rivals a name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explanation import Alternative, Naming, no_terms
 from wind_sensors.diagnosis.findings import equal_explanations
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit
-from wind_sensors.diagnosis.moments import is_steady, without_an_event
+from wind_sensors.diagnosis.moments import is_steady
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 
@@ -64,20 +64,6 @@ def test_what_passes_gains_all_the_time_that_it_holds(
     bounce = {"bounce_probability": 0.02, "bounce_delay": 0.001}
     drawn = Term(catalogue()["extra_pulses"], "cup", bounce, (50.0, 250.0))
     assert is_steady(comparison, before, seen(noise, drawn))
-
-
-def test_one_event_is_left_out_of_a_remainder(searcher: Searcher) -> None:
-    comparison = searcher.comparison
-    size = no_terms(searcher.whitener(searcher.bank.without), searcher).vector.size
-    at = comparison.grid.centres
-    everywhere = 0.2 * np.sin(2.0 * np.pi * at / 7.0)
-    once = np.where(np.abs(at - 150.0) < 5.0, 5.0 * np.sin(2.0 * np.pi * at / 4.0), 0.0)
-    event = in_first_channel(comparison, everywhere + once, size)
-    steady = in_first_channel(comparison, everywhere, size)
-    left = without_an_event(comparison, event)
-    assert float(left @ left) < 1.1 * float(steady @ steady)
-    kept = without_an_event(comparison, steady)
-    assert 0.8 * float(steady @ steady) < float(kept @ kept) <= float(steady @ steady)
 
 
 def named(searcher: Searcher, term: Term, alternatives: tuple[Alternative, ...] = ()) -> Naming:

@@ -15,7 +15,6 @@ from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.explanation import Alternative, Naming
 from wind_sensors.diagnosis.fitting import ALWAYS, planted
-from wind_sensors.diagnosis.moments import without_an_event
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.regions import RegionBank
 from wind_sensors.station.model import Station
@@ -91,14 +90,9 @@ def remainder_of(
     """What is left in the channels that the named effects reach.
 
     What another instrument shows beside them says nothing against the names, nor does what a
-    healthy day shows as loudly, nor the power of eddies if they bring some of their own, nor one
-    event if they always hold and act again and again.
+    healthy day shows as loudly, nor the power of eddies if they bring some of their own.
     """
-    left = naming.adequate.of(naming.fit.simulated)
-    again = all(t.interval == ALWAYS and not t.effect.occasional for t in naming.fit.terms)
-    if naming.fit.terms and again:
-        left = without_an_event(comparison, left)
-    scores = bank.scores(left)
+    scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
         reached = {
             instrument

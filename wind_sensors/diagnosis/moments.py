@@ -121,19 +121,3 @@ def is_its_moment(searcher: Searcher, current: Fit, further: Term) -> bool:
         if c.instrument in comparison.affected(searcher.station, further.instrument)
     )
     return float(np.sum(shown * inside)) > OF_A_MOMENT * float(np.sum(shown))
-
-
-def without_an_event(comparison: Comparison, white: FloatArray) -> FloatArray:
-    """A white vector without the part of the record in which each channel's is largest."""
-    out: FloatArray = white.copy()
-    n = comparison.coefficients
-    width = comparison.grid.n // MOMENTS
-    for k in range(len(comparison.channels)):
-        padded = np.zeros(comparison.grid.n)
-        padded[:n] = white[k * n : (k + 1) * n]
-        series = spectra.from_cosine(padded)
-        squares = (series[: MOMENTS * width] ** 2).reshape(MOMENTS, width).sum(axis=1)
-        first = int(np.argmax(np.convolve(squares, np.ones(EVENT), "valid")))
-        series[first * width : (first + EVENT) * width] = 0.0
-        out[k * n : (k + 1) * n] = spectra.to_cosine(series)[:n]
-    return out
