@@ -116,6 +116,10 @@ def _imbalance(entry: Entry, values: Values) -> dict[str, Any]:
     }
 
 
+MOST_IMBALANCE = 10.0
+"""[1/m]. The moment of mass over the moment of inertia is at most one over the radius of gyration,
+for the centre of mass lies no farther out; a vane's is ten centimetres and more."""
+
 MOST_LEAN_DEG = 6.0
 """In each direction: gravity turns a vane on a mast that looks upright. More would deflect the flow
 along the vane, which is another effect."""
@@ -136,7 +140,7 @@ VANE_IMBALANCE = Effect(
     occasional=True,
     parameters=(
         Parameter(
-            "imbalance", "1/m", -40.0, 40.0, minimum=0.15, step=0.05,
+            "imbalance", "1/m", -MOST_IMBALANCE, MOST_IMBALANCE, minimum=0.15, step=0.05,
             starts=(0.5, -0.5, 2.5, -2.5),
         ),
         Parameter("tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
