@@ -41,6 +41,10 @@ HEALTHY = 5
 SIZE = 5.0
 """In units of the smallest size worth reporting."""
 
+WITHIN_BOUNDS = 0.7
+"""Nothing is planted further than this share of the way to the bounds of the search: what is found
+there is taken for the wrong effect."""
+
 SEPARATION = 2.0
 """Of the reference from the instruments [m]."""
 
@@ -51,9 +55,15 @@ the true one is missing."""
 
 PROCESSES = 2
 
-SAME_PHYSICS = {"air_density": frozenset({"rotor_inertia", "vane_inertia"})}
-"""What says the same together, beyond what effects contain: at one temperature thin air makes a
-rotor and a vane answer as if they were heavier."""
+SAME_PHYSICS = {
+    "air_density": frozenset({"rotor_inertia", "vane_inertia"}),
+    "vane_offset": frozenset({"heading_deviation"}),
+    "axis_tilt": frozenset({"frame_error"}),
+}
+"""What says the same, beyond what effects contain: at one temperature thin air makes a rotor and a
+vane answer as if they were heavier; a compass that is off by a constant turns the wind that the
+vane sees as the vane's own offset does; a frame that is rolled and pitched leans every axis.
+"""
 
 
 @dataclass(frozen=True)
@@ -108,7 +118,11 @@ def recorded(station: Station, seed: int, made_by: Station | None = None) -> Rec
 def _most_visible(station: Station, recording: Recording, name: str) -> Template | None:
     """The template of an effect that changes the recording's signals most."""
     comparison = prepare(recording)
-    templates = templates_of(comparison, station, {name: catalogue()[name]})
+    templates = [
+        template
+        for template in templates_of(comparison, station, {name: catalogue()[name]})
+        if template.effect.relative_size(template.values) > 0.0
+    ]
     if not templates:
         return None
     bank = signature_bank(comparison, station, templates)
@@ -123,13 +137,17 @@ def _most_visible(station: Station, recording: Recording, name: str) -> Template
 
 
 def _sized(template: Template) -> dict[str, float]:
-    """The template's values, so far from the healthy ones that the size is `SIZE`."""
+    """The template's values, so far from the healthy ones that the size is `SIZE`, or less."""
     factor = SIZE / max(template.effect.relative_size(template.values), 0.1)
     values = dict(template.values)
     for parameter in template.effect.parameters:
         if parameter.healthy is not None and parameter.graded:
+            low, high = (
+                parameter.healthy + WITHIN_BOUNDS * (bound - parameter.healthy)
+                for bound in (parameter.low, parameter.high)
+            )
             moved = parameter.healthy + factor * (values[parameter.name] - parameter.healthy)
-            values[parameter.name] = float(np.clip(moved, parameter.low, parameter.high))
+            values[parameter.name] = float(np.clip(moved, low, high))
     if template.effect.name == "stuck_sensor":
         values.update(start=300.0, stop=300.0 + 20.0 * SIZE)
     return values

@@ -393,6 +393,13 @@ class Comparison:
             parts.append(np.nan_to_num(difference / t.statistics_deviation))
         return np.concatenate(parts)
 
+    @property
+    def channel_of_each(self) -> npt.NDArray[np.int_]:
+        """Number of the channel to which each of what is compared belongs, shape (l,)."""
+        numbers = np.arange(len(self.channels))
+        sizes = [self.measured.statistics[c.name].size for c in self.channels]
+        return np.concatenate((np.repeat(numbers, self.coefficients), np.repeat(numbers, sizes)))
+
     def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
         """How far `vector` falls when what is compared rises by one, shape (l,)."""
         parts = [trust[c.name].slope / trust[c.name].deviation for c in self.channels]

@@ -7,9 +7,10 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import Naming
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
-from wind_sensors.diagnosis.intervals import cell_signatures
+from wind_sensors.diagnosis.fitting import Term, planted
+from wind_sensors.diagnosis.intervals import cell_signatures, window_of
 from wind_sensors.diagnosis.whitening import in_series
 from wind_sensors.station.model import Station
 
@@ -27,6 +28,10 @@ VARIES_SHARE = 0.02
 record: a size of its own in one of them must not drop the cost by more than this, or than this
 share of the gain."""
 
+GROWS = 12.0
+"""Nor may a size that grows or shrinks steadily through the record drop it by more than this, or
+than that share of the gain."""
+
 LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
 
@@ -35,6 +40,12 @@ UNEVEN_SHARE = 0.005
 """An effect has one size, whether its signal is lively or quiet: another one in lively moments must
 not drop the cost by more than this, or than this share of the gain. What refuses jumps, or sticks
 and slips in its own way, is taken for a filter or for friction otherwise."""
+
+DISCORD = 20.0
+DISCORD_SHARE = 0.02
+"""An effect that reaches several signals has one size on all of them: one of its own on each must
+not drop the cost by more than this, or than this share of the gain. A heavier rotor slows its own
+signal as thin air does, which would let the vane overshoot as well."""
 
 
 def undo_each_other(naming: Naming, station: Station) -> bool:
@@ -78,23 +89,37 @@ def varies(naming: Naming, station: Station) -> bool:
     null = naming.adequate
     comparison = null.comparison
     left = null.of(naming.fit.simulated)
-    cuts = np.linspace(0.0, comparison.grid.n * comparison.grid.dt, PARTS + 1)
-    most = max(VARIES, VARIES_SHARE * naming.gain)
+    share = VARIES_SHARE * naming.gain
     for term in naming.fit.terms:
-        if term.interval != ALWAYS or term.effect.noisy or not term.effect.exact:
+        if term.effect.noisy or not term.effect.exact:
             continue
-        others = [t for t in naming.fit.terms if t is not term]
-        without = comparison.possible(planted(station, others))
+        without = _without(naming, station, term)
         if without is None:
             continue
+        cuts = np.linspace(*window_of(comparison, term.interval), PARTS + 1)
         cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
         cells = null.through_standing(in_series(comparison, cells))
         for length in (1, 2, 4):
             parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
             power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
-            if np.any((parts @ left) ** 2 / power > most):
+            if np.any((parts @ left) ** 2 / power > max(VARIES, share)):
                 return True
+        if _drop_by_growth(cells, left) > max(GROWS, share):
+            return True
     return False
+
+
+def _drop_by_growth(cells: FloatArray, left: FloatArray) -> float:
+    """Drop of the cost if an effect's size went along a straight line in time.
+
+    Args:
+        cells: White signatures of neighbouring parts of equal length, shape (parts, m).
+        left: White vector of what is left, shape (m,).
+    """
+    whole = cells.sum(axis=0)
+    growing = (np.arange(len(cells)) - 0.5 * (len(cells) - 1)) @ cells
+    growing = growing - float(growing @ whole) / max(float(whole @ whole), 1e-9) * whole
+    return float(growing @ left) ** 2 / max(float(growing @ growing), 1.0)
 
 
 def unevenness(naming: Naming, station: Station, term: Term) -> float:
@@ -105,30 +130,73 @@ def unevenness(naming: Naming, station: Station, term: Term) -> float:
         station: As commissioned.
         term: One of its effects.
     """
-    null = naming.adequate
-    comparison = null.comparison
-    others = [t for t in naming.fit.terms if t is not term]
-    without = comparison.possible(planted(station, others))
+    comparison = naming.adequate.comparison
+    without = _without(naming, station, term)
     if without is None:
         return 0.0
-    n = comparison.coefficients
-    halves = np.zeros((2, n * len(comparison.channels)))
+    halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
     for k, channel in enumerate(comparison.channels):
-        name = channel.name
-        change = naming.fit.simulated.series[name] - without.series[name]
-        if not np.any(change):
-            continue
-        trust = null.trust[name]
-        lively = _lively(without.series[name], comparison.grid.dt)
+        lively = _lively(without.series[channel.name], comparison.grid.dt)
         for half, weight in zip(halves, (1.0 - lively, lively), strict=True):
-            part = spectra.to_cosine(comparison.masked(change * weight))[:n]
-            half[k * n : (k + 1) * n] = trust.slope / trust.deviation * part
+            _put(half, naming, without, k, weight)
+    return _drop_by_own_sizes(naming, halves)
+
+
+def discord(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if an effect had a size of its own on each signal that it reaches.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: One of its effects.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    without = _without(naming, station, term)
+    if without is None:
+        return 0.0
+    change = naming.fit.simulated.flat(comparison.channels) - without.flat(comparison.channels)
+    change = np.nan_to_num(change) * comparison.weights(null.trust)
+    channel = comparison.channel_of_each
+    each = np.array([np.where(channel == k, change, 0.0) for k in range(len(comparison.channels))])
+    return _drop_by_own_sizes(naming, each[np.any(each, axis=1)])
+
+
+def is_discordant(naming: Naming, station: Station) -> bool:
+    """Whether an effect has another size on one of the signals that it reaches than on another."""
+    most = max(DISCORD, DISCORD_SHARE * naming.gain)
+    return any(discord(naming, station, term) > most for term in naming.fit.terms)
+
+
+def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:
+    """The simulation with the other effects only; None: it is not possible."""
+    others = [t for t in naming.fit.terms if t is not term]
+    return naming.adequate.comparison.possible(planted(station, others))
+
+
+def _put(part: FloatArray, naming: Naming, without: Simulated, k: int, weight: FloatArray) -> None:
+    """Write what an effect changes on one channel, weighted in time, into a part of it."""
+    comparison = naming.adequate.comparison
+    name = comparison.channels[k].name
+    n = comparison.coefficients
+    change = (naming.fit.simulated.series[name] - without.series[name]) * weight
+    trust = naming.adequate.trust[name]
+    coefficients = spectra.to_cosine(comparison.masked(change))[:n]
+    part[k * n : (k + 1) * n] = trust.slope / trust.deviation * coefficients
+
+
+def _drop_by_own_sizes(naming: Naming, parts: FloatArray) -> float:
+    """Drop of the cost if each part of an effect had a size of its own instead of a common one."""
+    if len(parts) < 2:
+        return 0.0
+    null = naming.adequate
     left = null.of(naming.fit.simulated)
-    padded = np.pad(halves, ((0, 0), (0, left.size - halves.shape[1])))
-    parts = null.through_standing(padded)
-    power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1e-9)
-    sizes = parts @ left / power
-    return float((sizes[1] - sizes[0]) ** 2 / np.sum(1.0 / power))
+    padded = np.pad(parts, ((0, 0), (0, left.size - parts.shape[1])))
+    white = null.through_standing(padded)
+    power = np.maximum(np.einsum("ij,ij->i", white, white), 1e-9)
+    sizes = white @ left / power
+    common = float(power @ sizes / power.sum())
+    return float(power @ (sizes - common) ** 2)
 
 
 def _lively(series: FloatArray, dt: float) -> FloatArray:

@@ -47,6 +47,12 @@ third: of a large effect the form may leave more."""
 REMAINDER_P = 0.05
 """Nor does a remainder count that a healthy day shows with more probability."""
 
+FREELY_BENT = 5
+BENT_REMAINDER_P = 0.01
+"""Effects with so many parameters are series that follow whatever goes with direction or heading:
+what they leave that a healthy day shows with less probability speaks against them however little
+it is."""
+
 NOISY = 6.0
 VERY_NOISY = 8.0
 """Noise beyond this many standard deviations of healthy days is physics that a name left out;
@@ -203,7 +209,8 @@ def verdict_of(
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
     sizeable = share > max(REMAINDER_SHARE / max(remainder.score, 1e-9), LEAST_REMAINDER)
-    clear = remainder.score > REMAINDER_SCORE and sizeable
-    if (p < REMAINDER_P and clear) or _patchwork(naming):
+    bent = any(len(term.effect.parameters) >= FREELY_BENT for term in naming.fit.terms)
+    counts = (p < REMAINDER_P and sizeable) or (p < BENT_REMAINDER_P and bent)
+    if (remainder.score > REMAINDER_SCORE and counts) or _patchwork(naming):
         return "unknown"
     return "ambiguous" if equal else "named"

@@ -56,6 +56,14 @@ def interval_of(comparison: Comparison, begin: float, end: float) -> Interval:
     )
 
 
+def window_of(comparison: Comparison, interval: Interval) -> tuple[float, float]:
+    """Beginning and end of an effect in the record [s since the first bin]."""
+    since = comparison.drive.elapsed
+    begins, ends = interval
+    length = comparison.grid.n * comparison.grid.dt
+    return max(begins - since, 0.0), length if ends is None else min(ends - since, length)
+
+
 def cell_signatures(
     comparison: Comparison,
     without: Simulated,

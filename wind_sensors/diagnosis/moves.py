@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -25,7 +26,7 @@ from wind_sensors.diagnosis.explanation import (
     no_terms,
     total,
 )
-from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, without_term
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, planted, without_term
 from wind_sensors.diagnosis.search import Searcher
 from wind_sensors.diagnosis.whitening import Whitener
 
@@ -33,6 +34,53 @@ MERGE_CANDIDATES = 8
 MERGE_FINALISTS = 3
 SWAP_CANDIDATES = 3
 SWAP_GAIN = 1.0
+
+
+LOOKS = (0.75, 0.88, 1.14, 1.33)
+"""Sizes at which a fit is looked at again, in its own: a vane that turns round the other way, or a
+pulse on the other side of a bin's border, leaves hollows in the cost that small steps stay in."""
+MOST_LOOKS = 4
+
+
+def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit from the best of the sizes around its own, while that is clearly better.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+    """
+    for _ in range(MOST_LOOKS):
+        costs = [(_cost(searcher, whitener, terms), terms) for terms in _around(current.terms)]
+        cost, terms = min(costs, key=lambda pair: pair[0], default=(current.cost, ()))
+        if cost > current.cost - ROUGHLY:
+            return current
+        current = fit(whitener, searcher.station, terms, searcher.bank.without)
+    return current
+
+
+def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
+    """The terms with one parameter larger or smaller."""
+    found = []
+    for k, term in enumerate(terms):
+        for parameter in term.effect.parameters:
+            healthy, value = parameter.healthy, term.values[parameter.name]
+            if healthy is None or value == healthy or parameter.value_from != "fit":
+                continue
+            for factor in LOOKS:
+                moved = healthy + factor * (value - healthy)
+                if parameter.low <= moved <= parameter.high:
+                    other = replace(term, values={**term.values, parameter.name: moved})
+                    found.append((*terms[:k], other, *terms[k + 1 :]))
+    return found
+
+
+def _cost(searcher: Searcher, whitener: Whitener, terms: Sequence[Term]) -> float:
+    simulated = whitener.comparison.possible(planted(searcher.station, terms))
+    if simulated is None:
+        return math.inf
+    vector = whitener.of(simulated)
+    return float(vector @ vector)
 
 
 def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:

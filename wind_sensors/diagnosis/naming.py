@@ -31,7 +31,7 @@ from wind_sensors.diagnosis.explanation import (
 )
 from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
-from wind_sensors.diagnosis.moves import merged, pruned, simplified, swapped
+from wind_sensors.diagnosis.moves import looked_around, merged, pruned, simplified, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.pairs import better_pair
 from wind_sensors.diagnosis.regions import region_bank
@@ -121,7 +121,8 @@ def _leader(
     """The explanation that brings most of those that bring enough; None: there is none.
 
     What the signals tell by themselves comes first. Of the others only those compete that are not
-    clearly behind in likelihood; of those that bring the same the likeliest leads.
+    clearly behind in likelihood; of those that bring the same the likeliest leads. One that is both
+    simpler and likelier leads in any case.
 
     Args:
         searcher: The search.
@@ -153,7 +154,13 @@ def _leader(
     enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough)]
     enough = explaining_what_stands_out(searcher, whitener, current, enough)
     most = max(brings for brings, _ in enough)
-    return next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
+    leader = next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
+    simpler = [
+        one
+        for _, one in enough
+        if one.evidence < leader.evidence and one.fit.active < leader.fit.active
+    ]
+    return min(simpler, key=lambda one: one.evidence, default=leader)
 
 
 def explaining_what_stands_out(
@@ -198,6 +205,27 @@ def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -
         and other.evidence < one.evidence + ONSET_GAIN
         for _, other in others
     )
+
+
+def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judged:
+    """The explanation with its last effect all the time, where that explains nearly as much.
+
+    A fit that has to find a large effect from a small one may go astray over the whole record and
+    arrive in a part of it.
+
+    Args:
+        searcher: The search.
+        one: An explanation.
+        named: The terms so far; None: there are none.
+    """
+    newest = one.fit.terms[-1]
+    if newest.interval == ALWAYS or newest.effect.legible:
+        return one
+    terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
+    always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
+    (other,) = judged(searcher, [always], named)
+    as_well = plausible(other.fit) and other.evidence < one.evidence + ONSET_GAIN
+    return other if as_well else one
 
 
 def _not_told(one: Judged) -> bool:
@@ -339,6 +367,7 @@ def _greedy(
         leader = _leader(searcher, whitener, current, ranked)
         if leader is None:
             break
+        leader = held_throughout(searcher, leader, named)
         current = leader.fit
         if first:
             alone = current.terms
@@ -414,6 +443,8 @@ def _settled(
         alternatives: Those that lost.
         screened: Best scores of the first screening.
     """
+    whitener = searcher.whitener(current.simulated)
+    current = looked_around(searcher, whitener, seen_in(whitener, current))
     whitener = searcher.whitener(current.simulated)
     current = simplified(searcher, whitener, seen_in(whitener, current))
     if current.terms:

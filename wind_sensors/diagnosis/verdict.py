@@ -12,7 +12,12 @@ from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration, too_calm
 from wind_sensors.diagnosis.comparison import Comparison, Simulated
-from wind_sensors.diagnosis.contradictions import is_uneven, undo_each_other, varies
+from wind_sensors.diagnosis.contradictions import (
+    is_discordant,
+    is_uneven,
+    undo_each_other,
+    varies,
+)
 from wind_sensors.diagnosis.decision import (
     REMAINDER_P,
     Verdict,
@@ -196,6 +201,8 @@ def _upheld(
         objection = "with another size in parts of the record"
     elif is_uneven(naming, station):
         objection = "with another size in lively minutes than in quiet ones"
+    elif is_discordant(naming, station):
+        objection = "with another size on one signal than on another"
     elif not determined(findings):
         objection = "of any size, nought among them"
     else:

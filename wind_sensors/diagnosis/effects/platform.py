@@ -98,7 +98,7 @@ PLATFORM_VELOCITY = Effect(
     region="with the carrier's speed and heading",
     parameters=(
         Parameter(
-            "velocity_share", "1", -1.0, 1.0, healthy=1.0, minimum=MISSING_SHARE,
+            "velocity_share", "1", -1.2, 1.0, healthy=1.0, minimum=MISSING_SHARE,
             starts=(0.0, 0.5), step=0.02,
         ),
         Parameter(

@@ -62,7 +62,8 @@ CALIBRATION_OFFSET = Effect(
     equation="l S = U - U0 + offset",
     source="K14, eq. (58)",
     region="all speeds alike, in relative terms at low speed",
-    parameters=(Parameter("offset", "m/s", -3.0, 3.0, minimum=0.08, step=0.02),),
+    # Too much by a metre and more would be a rotor that turns in a calm.
+    parameters=(Parameter("offset", "m/s", -3.0, 1.2, minimum=0.08, step=0.02),),
     applies=_is_rotor,
     update=_offset,
     templates=({"offset": 0.08},),

@@ -1,0 +1,112 @@
+"""Names that their own sizes speak against, and fits that stop short of the right size."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.contradictions import is_discordant, varies
+from wind_sensors.diagnosis.decision import Remainder, Verdict, verdict_of
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explanation import Judged, Naming, evidence, no_terms
+from wind_sensors.diagnosis.fitting import ALWAYS, Interval, Term, fit
+from wind_sensors.diagnosis.moves import looked_around
+from wind_sensors.diagnosis.naming import held_throughout
+from wind_sensors.diagnosis.noise_level import Excess
+from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.search import Searcher, searcher_of
+from wind_sensors.diagnosis.whitening import Whitener
+
+
+def searched(
+    effect: str, instrument: str, values: dict[str, float], interval: Interval = ALWAYS
+) -> tuple[Searcher, Whitener]:
+    """The search on a recording that holds an effect, and its null."""
+    station = with_effect(STATION, catalogue()[effect], instrument, values, interval)
+    recording = replace(recorded(station, 72), station=STATION)
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
+    return searcher, searcher.whitener(searcher.bank.without)
+
+
+def named(searcher: Searcher, null: Whitener, term: Term) -> Naming:
+    fitted = fit(null, STATION, [term], searcher.bank.without)
+    adequate = searcher.whitener(fitted.simulated, fitted)
+    nothing = null.of(searcher.bank.without)
+    return Naming(fitted, null, adequate, nothing, float(nothing @ nothing) - fitted.cost)
+
+
+@pytest.mark.parametrize(
+    ("effect", "instrument", "values", "discordant"),
+    [
+        ("air_density", "station", {"density_ratio": 0.5}, False),
+        ("rotor_inertia", "cup", {"inertia_factor": 2.5}, True),
+    ],
+)
+def test_thin_air_shows_on_the_vane_as_well(
+    effect: str, instrument: str, values: dict[str, float], discordant: bool
+) -> None:
+    searcher, null = searched(effect, instrument, values)
+    thin = Term(catalogue()["air_density"], "station", {"density_ratio": 0.6})
+    naming = named(searcher, null, thin)
+    # By the rotor alone it is thin air either way.
+    assert naming.gain > 40.0
+    assert naming.fit.terms[0].values["density_ratio"] < 0.75
+    assert is_discordant(naming, STATION) is discordant
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "growing"),
+    [("timestamp_latency", {"latency": 0.6}, False), ("clock_drift", {"drift": 3000.0}, True)],
+)
+def test_a_delay_that_grows_while_it_lasts_is_no_latency(
+    effect: str, values: dict[str, float], growing: bool
+) -> None:
+    since = (120.0, None)
+    planted = ALWAYS if growing else since
+    searcher, null = searched(effect, "vane", values, planted)
+    late = Term(catalogue()["timestamp_latency"], "vane", {"latency": 0.6}, since)
+    naming = named(searcher, null, late)
+    assert naming.gain > 40.0
+    assert varies(naming, STATION) is growing
+
+
+@pytest.mark.parametrize(
+    ("effect", "p", "verdict"),
+    [
+        ("flow_distortion", 0.002, "unknown"),
+        ("flow_distortion", 0.03, "named"),
+        ("calibration_drift", 0.002, "named"),
+    ],
+)
+def test_a_series_of_harmonics_must_leave_nothing(effect: str, p: float, verdict: Verdict) -> None:
+    searcher, null = searched("calibration_drift", "cup", {"gain": 0.9})
+    term = Term(catalogue()[effect], "cup", dict(catalogue()[effect].templates[0]))
+    one = fit(null, STATION, [term], searcher.bank.without, iterations=0)
+    naming = Naming(one, null, null, null.of(searcher.bank.without), 2000.0)
+    little = Remainder(score=1.1, p=p, share=0.005)
+    assert verdict_of(naming, [], little, {}, 0.002, Excess()) == verdict
+
+
+def test_a_fit_leaves_a_hollow_that_small_steps_stay_in() -> None:
+    searcher, null = searched("calibration_drift", "cup", {"gain": 0.9})
+    short = Term(catalogue()["calibration_drift"], "cup", {"gain": 0.93})
+    stopped = fit(null, STATION, [short], searcher.bank.without, iterations=0)
+    found = looked_around(searcher, null, stopped)
+    assert found.cost < stopped.cost - 10.0
+    assert found.terms[0].values["gain"] == pytest.approx(0.9, abs=0.01)
+    # What is where it belongs stays there.
+    assert looked_around(searcher, null, found).terms == found.terms
+
+
+@pytest.mark.parametrize("planted", [ALWAYS, (150.0, 300.0)])
+def test_what_holds_throughout_is_not_said_to_pass(planted: Interval) -> None:
+    searcher, null = searched("vane_offset", "vane", {"offset": 8.0}, planted)
+    passing = Term(catalogue()["vane_offset"], "vane", {"offset": 8.0}, (150.0, 300.0))
+    one = fit(null, STATION, [passing], searcher.bank.without)
+    null = searcher.whitener(one.simulated)
+    kept = held_throughout(searcher, Judged(one, null, evidence(one, null)), None)
+    assert kept.fit.terms[0].interval == planted
+    assert no_terms(null, searcher).cost > kept.fit.cost
