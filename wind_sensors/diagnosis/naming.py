@@ -211,7 +211,7 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     """The explanation with its last effect all the time, where that explains nearly as much.
 
     A fit that has to find a large effect from a small one may go astray over the whole record and
-    arrive in a part of it.
+    arrive in a part of it. An interval that the raw signals show by themselves stays.
 
     Args:
         searcher: The search.
@@ -219,7 +219,8 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
         named: The terms so far; None: there are none.
     """
     newest = one.fit.terms[-1]
-    if newest.interval == ALWAYS or newest.effect.legible:
+    read = any(guess.interval != ALWAYS for guess in searcher.guesses.get(newest.key, ()))
+    if newest.interval == ALWAYS or newest.effect.legible or read:
         return one
     terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
     always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
