@@ -103,9 +103,10 @@ def test_the_oracle_fits_the_truth_alone_and_weighs_what_was_said_against_it(
     told: dict[str, list[str]] = {}
 
     def diagnose_with(
-        folder: Path, name: str, station: str, timeout: float, *, options: list[str], target: Path
+        folder: Path, name: str, station: str, timeout: float, *, options: list[str], kind: str
     ) -> None:
         told[name] = options
+        target = folder / kind / name
         target.mkdir(parents=True)
         finding = {"effect": "icing", "proof": {"excess_removed": 0.8}}
         (target / "diagnosis.json").write_text(json.dumps({"findings": [finding]}))

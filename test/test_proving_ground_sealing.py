@@ -13,6 +13,7 @@ import pytest
 
 from proving_ground.generate import RecordingSpec
 from proving_ground.minimum_sizes import MINIMUM_SIZES
+from proving_ground.scoring.again import chance, changes, lines
 from proving_ground.scoring.card import is_failure
 from proving_ground.scoring.dose import dose_response
 from proving_ground.scoring.figures import confusion
@@ -20,7 +21,7 @@ from proving_ground.scoring.intervals import covered
 from proving_ground.scoring.outcome import Judged, judge
 from proving_ground.scoring.rates import clopper_pearson, promised_rates
 from proving_ground.sealing.cipher import commitment, decrypt, encrypt, new_key
-from proving_ground.sealing.opening import judge_all, open_answers, score
+from proving_ground.sealing.opening import judge_all, judge_said, open_answers, score
 from proving_ground.sealing.seal import ANSWERS, MANIFEST, RECORDINGS, Sealed, seal
 from proving_ground.sealing.strata import SHARES, SIZES, counts, make_plan
 from proving_ground.sealing.trial import run_all
@@ -125,6 +126,32 @@ def test_the_diagnosing_process_sees_the_recording_and_nothing_else(
     results = judge_all(sealed.folder, open_answers(sealed.folder, KEY))
     healthy = next(j for j in results if j.stratum == "healthy")
     assert healthy.outcome == "wrong name"
+
+
+def test_another_program_answers_beside_the_first(sealed: Sealed, tmp_path: Path) -> None:
+    spy = tmp_path / "spy.py"
+    spy.write_text(SPY.replace("vane_offset", "icing"))
+    (name, *_) = sorted(p.name for p in (sealed.folder / RECORDINGS).iterdir())
+    program = (sys.executable, str(spy))
+    assert run_all(sealed.folder, program=program, results=tmp_path / "new", only=[name]) == 0
+    (now,) = judge_said(tmp_path / "new", open_answers(sealed.folder, KEY))
+    assert (now.name, now.named) == (name, ("icing",))
+    earlier = judge_said(sealed.folder, open_answers(sealed.folder, KEY))
+    assert all(j.named == ("vane_offset",) for j in earlier)
+
+
+def test_only_what_is_answered_differently_is_compared() -> None:
+    vane = [{"effect": "vane_offset"}]
+    right, silent = judged(("vane_offset",), "named", vane), judged(("vane_offset",))
+    assert changes([right], [right]) == []
+    (change,) = changes([silent], [right])
+    assert (change.before.verdict, change.after.verdict) == ("none", "named")
+    # Five gained and none lost: 2 / 2^5.
+    assert chance([change] * 5) == pytest.approx(1 / 16)
+    assert chance([]) == 1.0
+    page = "\n".join(lines([silent], [right]))
+    assert "| none (failure) | vane_offset |" in page
+    assert "| failures, of 1 | 1 | 0 |" in page
 
 
 def test_answers_stay_shut_until_all_is_said(sealed: Sealed, tmp_path: Path) -> None:

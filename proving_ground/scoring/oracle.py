@@ -58,7 +58,7 @@ def shares(
         if not (target / DIAGNOSIS).is_file():
             others = [w for n in MINIMUM_SIZES if n not in one.truth for w in ("--without", n)]
             station = str(entries[one.name]["healthy"])
-            run_one(folder, one.name, station, timeout, options=others, target=target)
+            run_one(folder, one.name, station, timeout, options=others, kind=RUNS)
         return _removed(target / DIAGNOSIS)
 
     with ThreadPoolExecutor(max(1, jobs)) as pool:

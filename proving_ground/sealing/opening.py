@@ -38,17 +38,23 @@ def open_sealed(folder: Path, key: bytes) -> dict[str, Any]:
     return found
 
 
-def judge_all(folder: Path, answers: dict[str, Any]) -> list[Judged]:
-    """Every recording's outcome, in the order of the answers."""
+def judge_all(results: Path, answers: dict[str, Any]) -> list[Judged]:
+    """Every recording's outcome, in the order of the answers; results: where the runs are."""
     return [
         judge(
             name,
             answer,
-            _load(folder / RUNS / name / DIAGNOSIS),
-            _load(folder / RUNS / name / RUN_FILE),
+            _load(results / RUNS / name / DIAGNOSIS),
+            _load(results / RUNS / name / RUN_FILE),
         )
         for name, answer in answers.items()
     ]
+
+
+def judge_said(results: Path, answers: dict[str, Any]) -> list[Judged]:
+    """The outcomes of those recordings alone that were diagnosed."""
+    said = {n: a for n, a in answers.items() if (results / RUNS / n / RUN_FILE).is_file()}
+    return judge_all(results, said)
 
 
 def _load(path: Path) -> dict[str, Any] | None:
@@ -72,6 +78,18 @@ def about_set(folder: Path, sealed: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def check_all_said(folder: Path) -> None:
+    """Raises UserError if a recording of a sealed set was not diagnosed yet."""
+    names = read_manifest(folder)["recordings"]
+    missing = sum(not (folder / RUNS / name / RUN_FILE).is_file() for name in names)
+    if missing:
+        raise UserError(
+            f"{missing} recordings have not been diagnosed yet",
+            str(folder),
+            "`wind prove run` goes on where it stopped; `open --partial` scores what there is.",
+        )
+
+
 def score(
     folder: Path, key: bytes, output: Path, *, force: bool = False, partial: bool = False
 ) -> list[Rate]:
@@ -82,21 +100,14 @@ def score(
     """
     if output.exists() and not force:
         raise UserError("there is a score already", str(output), "Add --force to replace it.")
-    manifest = read_manifest(folder)
-    said = [n for n in manifest["recordings"] if (folder / RUNS / n / RUN_FILE).is_file()]
-    missing = len(manifest["recordings"]) - len(said)
-    if missing and not partial:
-        raise UserError(
-            f"{missing} recordings have not been diagnosed yet",
-            str(folder),
-            "`wind prove run` goes on where it stopped; --partial scores what there is.",
-        )
+    if not partial:
+        check_all_said(folder)
     sealed = open_sealed(folder, key)
     answers = sealed["answers"]
-    judged = judge_all(folder, {n: a for n, a in answers.items() if n in said})
+    judged = judge_said(folder, answers)
     about = {
         **about_set(folder, sealed),
-        "not diagnosed": missing,
+        "not diagnosed": len(answers) - len(judged),
         "peak memory [MB]": round(max((j.memory for j in judged), default=0.0)),
     }
     rates = write_card(output, judged, about)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -78,45 +78,53 @@ def run_all(
     timeout: float = 300.0,
     options: Sequence[str] = (),
     program: Sequence[str] = PROGRAM,
+    results: Path | None = None,
+    only: Collection[str] | None = None,
 ) -> int:
     """Diagnose what has not been diagnosed yet; how many diagnoses failed.
 
     Each station's baseline is learnt once from its healthy recordings. options are added to the
-    command line of `wind diagnose`; program is what stands for `wind`.
+    command line of `wind diagnose`; program is what stands for `wind`. Baselines and diagnoses go
+    to `results`; None: into the set itself. only: names of the recordings to diagnose; None: all.
 
     Raises UserError if a baseline cannot be learnt.
     """
     manifest = read_manifest(folder)
+    results = results or folder
     todo = [
         (name, entry)
         for name, entry in manifest["recordings"].items()
-        if not (folder / RUNS / name / RUN_FILE).exists()
+        if not (results / RUNS / name / RUN_FILE).exists() and (only is None or name in only)
     ]
     stations = sorted({str(entry["healthy"]) for _, entry in todo})
 
     def learn(station: str) -> Run | None:
-        return learn_baseline(folder, station, program)
+        return learn_baseline(folder, station, program, results)
 
     def one(item: tuple[str, dict[str, Any]]) -> Run:
         name, entry = item
         left_out = [w for effect in entry.get("without", []) for w in ("--without", str(effect))]
-        return run_one(folder, name, str(entry["healthy"]), timeout, program, [*left_out, *options])
+        return run_one(
+            folder, name, str(entry["healthy"]), timeout, program, [*left_out, *options], results
+        )
 
-    (folder / RUNS).mkdir(exist_ok=True)
-    (folder / RUNS / PROGRAM_FILE).write_text(json.dumps(program_version()), encoding="utf-8")
+    (results / RUNS).mkdir(parents=True, exist_ok=True)
+    (results / RUNS / PROGRAM_FILE).write_text(json.dumps(program_version()), encoding="utf-8")
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         list(track(pool.map(learn, stations), "learning baselines", total=len(stations)))
         runs = list(track(pool.map(one, todo), "diagnosing", total=len(todo)))
     return sum(run.status != 0 for run in runs)
 
 
-def learn_baseline(folder: Path, station: str, program: Sequence[str] = PROGRAM) -> Run | None:
+def learn_baseline(
+    folder: Path, station: str, program: Sequence[str] = PROGRAM, results: Path | None = None
+) -> Run | None:
     """Learn what is normal for a station, in a folder that holds its healthy recordings alone;
     None where that was done before.
 
     Raises UserError if it fails.
     """
-    target = folder / BASELINES / f"{station}.json"
+    target = (results or folder) / BASELINES / f"{station}.json"
     if target.exists():
         return None
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -139,18 +147,21 @@ def run_one(
     timeout: float,
     program: Sequence[str] = PROGRAM,
     options: Sequence[str] = (),
-    target: Path | None = None,
+    results: Path | None = None,
+    kind: str = RUNS,
 ) -> Run:
     """Diagnose one recording in a folder of its own, with an environment of its own.
 
-    What is kept goes to `target`; None: among the runs of the set.
+    Its baseline is among those of `results`, and there, among the runs of this kind, goes what is
+    kept; None: in the set itself.
     """
-    target = target or folder / RUNS / name
+    results = results or folder
+    target = results / kind / name
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="wind-prove-") as place:
         room = Path(place)
         _bring(folder / RECORDINGS / name, room / "recording")
-        shutil.copy(folder / BASELINES / f"{station}.json", room / "baseline.json")
+        shutil.copy(results / BASELINES / f"{station}.json", room / "baseline.json")
         command = [*program, "diagnose", "recording", "--baseline", "baseline.json"]
         run = _supervise([*command, "-o", "out", *options], room, target / LOG_FILE, timeout)
         for path in (room / "out").glob("*"):

@@ -50,6 +50,15 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     opened.add_argument("--no-oracle", action="store_true", help="do not fit the true models")
     opened.add_argument("--partial", action="store_true", help="score before all is diagnosed")
 
+    again = steps.add_parser(
+        "again", help="diagnose an opened set with another program, and tell what changed"
+    )
+    again.add_argument("folder", type=Path, metavar="DIR")
+    again.add_argument("--key", required=True, metavar="FILE|HEX")
+    again.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
+    again.add_argument("--jobs", type=_positive, default=1)
+    again.add_argument("--only", nargs="+", metavar="RECORDING", help="some of the recordings")
+
     peers = steps.add_parser("peers", help="other methods on the recordings of an opened set")
     peers.add_argument("folder", type=Path, metavar="DIR")
     peers.add_argument("--key", metavar="FILE|HEX", help="without it, all but the counting is done")
@@ -86,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         "seal": _seal,
         "run": _run,
         "open": _open,
+        "again": _again,
         "peers": _peers,
         "twins": _twins,
         "real": _real,
@@ -163,6 +173,29 @@ def _open(arguments: argparse.Namespace) -> int:
         write_shares(output, shares(arguments.folder, judged, arguments.jobs))
     print(f"wrote {output}")
     return int(any(rate.met is False for rate in rates))
+
+
+def _again(arguments: argparse.Namespace) -> int:
+    from proving_ground.scoring.again import lines
+    from proving_ground.sealing.opening import check_all_said, judge_said, open_answers
+    from proving_ground.sealing.trial import run_all
+
+    folder: Path = arguments.folder
+    check_all_said(folder)
+    answers = open_answers(folder, _read_key(arguments.key))
+    unknown = sorted(set(arguments.only or ()) - set(answers))
+    if unknown:
+        raise UserError(
+            f"no recording is called {', '.join(unknown)}", "--only", "The manifest lists them."
+        )
+    before = judge_said(folder, answers)
+    run_all(folder, jobs=arguments.jobs, results=arguments.output, only=arguments.only)
+    page = "\n".join(lines(before, judge_said(arguments.output, answers)))
+    path = arguments.output / "again.md"
+    path.write_text(page + "\n", encoding="utf-8")
+    print(page)
+    print(f"wrote {path}")
+    return 0
 
 
 def _peers(arguments: argparse.Namespace) -> int:
