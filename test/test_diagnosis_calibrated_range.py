@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline
 from wind_sensors.diagnosis.calibrated_range import (
+    is_calm,
     is_too_calm,
     need_calibration,
     slowest_wind,
@@ -68,3 +70,11 @@ def test_a_reading_that_repeats_is_told_in_any_wind() -> None:
     assert not need_calibration([stuck])
     assert need_calibration([stuck, slow])
     assert not need_calibration([])
+
+
+def test_a_day_is_calm_if_a_fifth_of_it_lies_below_calibrations() -> None:
+    comparison = compared(6.0)
+    windy = np.full(comparison.grid.n, 6.0)
+    lulls = np.where(np.arange(windy.size) < 0.3 * windy.size, 3.0, windy)
+    assert not is_calm(replace(comparison, speed=windy))
+    assert is_calm(replace(comparison, speed=lulls))

@@ -10,7 +10,7 @@ from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
-from wind_sensors.diagnosis.intervals import interval_gains
+from wind_sensors.diagnosis.intervals import cell_signatures, interval_gains
 from wind_sensors.diagnosis.onsets import refined_interval
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import searcher_of
@@ -53,3 +53,19 @@ def test_what_cannot_hold_all_the_time_keeps_its_interval() -> None:
     null = searcher.whitener(searcher.bank.without)
     found = fit(null, STATION, [passing], None, iterations=0)
     assert refined_interval(searcher, null, found).terms == (passing,)
+
+
+def test_cells_add_up_to_what_the_effect_changes_all_the_time() -> None:
+    comparison = prepare(recorded(STATION, 9))
+    searcher = searcher_of(comparison, baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    heavy = Term(catalogue()["rotor_inertia"], "cup", {"inertia_factor": 3.0})
+    without = searcher.bank.without
+    changed = comparison.simulate(planted(STATION, [heavy]))
+    cuts = np.array([0.0, 45.0, 130.0, 131.0, comparison.grid.n * comparison.grid.dt])
+    cells = cell_signatures(comparison, without, changed, null.trust, cuts)
+    # `vector` is measured minus simulated: the change enters with its sign turned.
+    whole = null.noise_whitened(without) - null.noise_whitened(changed)
+    assert cells.sum(axis=0) == pytest.approx(whole, abs=1e-6)
+    activities = sum(without.levels[c.name].size for c in comparison.channels)
+    assert np.abs(cells[:, -activities:]).max() > 1.0

@@ -45,6 +45,14 @@ def test_a_delay_of_the_winds_way_makes_no_day_loud() -> None:
     assert usual.get("vane", 0.0) < 1.0
 
 
+def test_a_calm_day_is_no_measure_of_windy_ones_unless_there_are_few() -> None:
+    quiet, loud = days("low_pass_filter", "vane", 1.0, 0.0)[1:]
+    rows, calm = [quiet, quiet, quiet, loud], [False, False, False, True]
+    assert loudest_gains(rows)["vane"] > 20.0
+    assert loudest_gains(rows, calm).get("vane", 0.0) < 1.0
+    assert loudest_gains(rows[1:], calm[1:])["vane"] > 20.0
+
+
 @pytest.mark.parametrize("effect", ["low_pass_filter", "wake_shadow"])
 def test_what_cannot_be_makes_no_day_loud(effect: str) -> None:
     instrument = "vane" if effect == "low_pass_filter" else "cup"

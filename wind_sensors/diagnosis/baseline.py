@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STEPS, STILLNESS, Channel
+from wind_sensors.diagnosis import activity
+from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STEPS, Channel
 from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
@@ -29,22 +30,43 @@ FREQUENCIES = np.geomspace(0.0005, 1.25, 24)
 WAVENUMBERS = np.geomspace(0.004, 0.15, 6)
 """Frequencies over the wind's speed at which a baseline keeps the level of the noise [1/m]."""
 
+UNKNOWN_ACTIVITY_EXCESS = 8.0
+"""More than nearly all stations have."""
+
 _BANDS = len(NORMALISED_BANDS) - 1
-_SPECTRUM_PRIOR = 0.22
-_INTERVAL_PRIOR = np.array([0.002, 0.002, 0.003, 0.001, 0.0007, 0.001])
-_STILLNESS_PRIOR = 0.12
-_ERRATIC_PRIOR = 0.003
-_STEPS_PRIOR = 0.1
+
+_STATION_SPECTRUM = 0.44
+_STATION_INTERVALS = (0.004, 0.004, 0.006, 0.002, 0.0014, 0.002)
+_STATION_STILLNESS = (0.24, 0.24, 0.24)
+_STATION_ERRATIC = 0.006
+_STATION_STEPS = 0.2
+
+_DAILY_SPECTRUM = 0.12
+_DAILY_INTERVALS = (0.0008, 0.0008, 0.0008, 0.0003, 0.0001, 0.00008)
+_DAILY_STILLNESS = (0.11, 0.09, 0.06)
+_DAILY_ERRATIC = 0.001
+_DAILY_STEPS = 0.01
+"""A station's discs, slots and bearings are the same on every day: from day to day a statistic
+departs by far less from what its station usually shows than any station does from its simulation.
+"""
 
 
-def statistics_prior(channel: Channel) -> FloatArray:
-    """Standard deviations expected of a channel's statistics before any healthy recording."""
-    bands = np.full(_BANDS, _SPECTRUM_PRIOR)
+def station_deviation(channel: Channel) -> FloatArray:
+    """Standard deviations of a channel's statistics from the simulation of any station."""
+    bands = np.full(_BANDS, _STATION_SPECTRUM)
     if channel.kind == "vane_angle":
-        still = np.full(STILLNESS, _STILLNESS_PRIOR)
-        erratic, steps = np.full(ERRATIC, _ERRATIC_PRIOR), np.full(STEPS, _STEPS_PRIOR)
-        return np.concatenate((bands, still, erratic, steps))
-    return np.concatenate((bands, _INTERVAL_PRIOR))
+        erratic, steps = np.full(ERRATIC, _STATION_ERRATIC), np.full(STEPS, _STATION_STEPS)
+        return np.concatenate((bands, _STATION_STILLNESS, erratic, steps))
+    return np.concatenate((bands, _STATION_INTERVALS))
+
+
+def daily_deviation(channel: Channel) -> FloatArray:
+    """Standard deviations of a channel's statistics from what its station usually shows."""
+    bands = np.full(_BANDS, _DAILY_SPECTRUM)
+    if channel.kind == "vane_angle":
+        erratic, steps = np.full(ERRATIC, _DAILY_ERRATIC), np.full(STEPS, _DAILY_STEPS)
+        return np.concatenate((bands, _DAILY_STILLNESS, erratic, steps))
+    return np.concatenate((bands, _DAILY_INTERVALS))
 
 
 @dataclass(frozen=True)
@@ -58,6 +80,8 @@ class ChannelBaseline:
         statistics_mean, statistics_deviation: Of measured minus simulated statistics.
         noise_mean, noise_deviation: Of the logarithm of the residual's spectrum relative to the
             signal's, at `WAVENUMBERS`; an infinite deviation where nothing is known.
+        activity_excess: Variance of the levels of quick eddies, beyond their mean over a record,
+            over that of as many independent coefficients; shape (bands,).
     """
 
     exponent: FloatArray
@@ -66,6 +90,17 @@ class ChannelBaseline:
     statistics_deviation: FloatArray
     noise_mean: FloatArray
     noise_deviation: FloatArray
+    activity_excess: FloatArray = field(
+        default_factory=lambda: np.full(activity.BANDS, UNKNOWN_ACTIVITY_EXCESS)
+    )
+
+    def activity_deviation(self, sampling: FloatArray) -> FloatArray:
+        """Standard deviation of the levels of quick eddies, shape (bands,).
+
+        Args:
+            sampling: Variance of as many independent coefficients, shape (bands,).
+        """
+        return np.asarray(np.sqrt(self.activity_excess * sampling))
 
     def exponent_at(self, frequency: FloatArray) -> FloatArray:
         """Exponents at other frequencies [Hz]."""
@@ -91,7 +126,8 @@ class Baseline:
         standing: Scatter of each template's amplitude between them.
         loudest: Largest drop of the cost, beyond its parameters, that an effect of an instrument
             (or of the `station`, the `platform`) promises in one healthy recording judged by the
-            others.
+            others; calm ones aside.
+        loudest_in_calm: The same, calm ones among them.
         usual_wind: Wind speed [m/s] that healthy recordings exceed nearly all the time.
         place: Where the reference stands; None: unknown.
     """
@@ -103,6 +139,7 @@ class Baseline:
     means: Mapping[str, float] = field(default_factory=dict)
     standing: Mapping[str, float] = field(default_factory=dict)
     loudest: Mapping[str, float] = field(default_factory=dict)
+    loudest_in_calm: Mapping[str, float] = field(default_factory=dict)
     usual_wind: float = np.inf
     place: Place | None = None
 
@@ -119,6 +156,10 @@ class Baseline:
         elsewhere = min(1.0, FEW_DAYS / max(len(self.recordings), 1))
         overall = max(self.loudest.values(), default=0.0)
         return max(self.loudest.get(instrument, 0.0), elsewhere * overall)
+
+    def in_calm(self) -> Baseline:
+        """The same baseline for a recording of a calm day."""
+        return replace(self, loudest=self.loudest_in_calm)
 
     def for_station(self, station: Station) -> Baseline:
         """The same baseline for a recording whose station file may say otherwise.
@@ -159,6 +200,7 @@ class Baseline:
             "means": dict(self.means),
             "standing": dict(self.standing),
             "loudest": dict(self.loudest),
+            "loudest_in_calm": dict(self.loudest_in_calm),
             "usual_wind": _listed(np.array([self.usual_wind]))[0],
             "place": None if self.place is None else asdict(self.place),
         }
@@ -184,6 +226,7 @@ class Baseline:
                 means=content["means"],
                 standing=content["standing"],
                 loudest=content["loudest"],
+                loudest_in_calm=content.get("loudest_in_calm", content["loudest"]),
                 usual_wind=float(_unlisted([content["usual_wind"]])[0]),
                 place=None if content.get("place") is None else Place(**content["place"]),
             )
@@ -227,12 +270,12 @@ def default_channel(channel: Channel) -> ChannelBaseline:
     between reference and instrument, which both share (1/2).
     """
     exponent = np.where(FREQUENCIES < 0.1, 1.0, 0.5)
-    prior = statistics_prior(channel)
+    deviation = station_deviation(channel)
     return ChannelBaseline(
         exponent=exponent,
         low_ratio=np.ones(FREQUENCIES.size),
-        statistics_mean=np.zeros(prior.size),
-        statistics_deviation=2.0 * prior,
+        statistics_mean=np.zeros(deviation.size),
+        statistics_deviation=deviation,
         noise_mean=np.zeros(WAVENUMBERS.size),
         noise_deviation=np.full(WAVENUMBERS.size, np.inf),
     )

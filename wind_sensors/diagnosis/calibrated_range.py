@@ -14,6 +14,9 @@ FEWEST_KNOWN = 0.25
 """Share of a record in which that must be known."""
 
 
+CALM_SHARE = 0.2
+"""A record is calm from this share in such winds on."""
+
 REACH = 0.5
 """Down to this share of their wind, healthy recordings say something of what is normal."""
 
@@ -26,6 +29,15 @@ def slowest_wind(baseline: Baseline) -> float:
 def calm_share(comparison: Comparison, baseline: Baseline) -> float:
     """Share of a record in winds that neither certificates nor healthy recordings cover."""
     return float(np.mean(comparison.speed < min(CALIBRATED_FROM, baseline.usual_wind)))
+
+
+def is_calm(comparison: Comparison) -> bool:
+    """Whether much of a record lies in winds below those of a calibration.
+
+    A rotor near its starting speed and a vane that hardly feels the wind do there what they never
+    do in a wind: what a calm day shows is no measure of a windy one.
+    """
+    return float(np.mean(comparison.speed < CALIBRATED_FROM)) > CALM_SHARE
 
 
 def is_too_calm(comparison: Comparison, baseline: Baseline) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.observation import (
     LOWEST_BAND_FREQUENCY,
@@ -67,11 +67,16 @@ class Simulated:
         series: The series, by channel name: m/s for a rotor, lateral m/s for a vane.
         statistics: By channel name: log spectra in the normalised bands (nan: band not seen),
             for rotors followed by the interval statistics.
+        levels: By channel name: logarithm of the power of quick eddies in each segment, shape
+            (bands, segments).
+        counted: Segments that count, shape (segments,).
     """
 
     cosine: dict[str, FloatArray]
     series: dict[str, FloatArray]
     statistics: dict[str, FloatArray]
+    levels: dict[str, FloatArray]
+    counted: npt.NDArray[np.bool_]
 
     def with_others(self, others: Simulated) -> Simulated:
         """The same with channels taken from another."""
@@ -79,12 +84,20 @@ class Simulated:
             {**self.cosine, **others.cosine},
             {**self.series, **others.series},
             {**self.statistics, **others.statistics},
+            {**self.levels, **others.levels},
+            self.counted,
         )
 
+    def activity(self, channel: str) -> FloatArray:
+        """Levels of a channel beyond their mean over the segments that count, flat."""
+        return activity.contrasts(self.levels[channel], self.counted).ravel()
+
     def flat(self, channels: Sequence[Channel]) -> FloatArray:
-        """What is compared: coefficients of all channels, then all statistics; shape (l,)."""
+        """What is compared: coefficients of all channels, all statistics, all activities, (l,)."""
         return np.concatenate(
-            [self.cosine[c.name] for c in channels] + [self.statistics[c.name] for c in channels]
+            [self.cosine[c.name] for c in channels]
+            + [self.statistics[c.name] for c in channels]
+            + [self.activity(c.name) for c in channels]
         )
 
 
@@ -97,12 +110,14 @@ class Trust:
         deviation: Standard deviation of the residual's noise.
         statistics_mean: Healthy mean of measured minus simulated statistics.
         statistics_deviation: Its standard deviation; inf where the statistic is not used.
+        activity_deviation: Of measured minus simulated levels, shape (bands,); inf where unseen.
     """
 
     slope: FloatArray
     deviation: FloatArray
     statistics_mean: FloatArray
     statistics_deviation: FloatArray
+    activity_deviation: FloatArray
 
 
 @dataclass(frozen=True)
@@ -181,6 +196,11 @@ class Comparison:
         return replace(self, drive=drive, memory=DriveMemory(drive))
 
     @property
+    def unseen(self) -> Simulated:
+        """Nothing of any channel."""
+        return Simulated({}, {}, {}, {}, activity.counted_segments(self.grid, self.mask))
+
+    @property
     def coefficients(self) -> int:
         """Number of cosine coefficients compared in each channel."""
         return min(self.grid.n, int(2.0 * self.grid.n * self.grid.dt * HIGHEST_FREQUENCY))
@@ -232,7 +252,7 @@ class Comparison:
             only: Instruments to simulate; empty: all.
             rest: Simulation to take the other instruments from.
         """
-        seen = Simulated({}, {}, {}) if rest is None else rest
+        seen = self.unseen if rest is None else rest
         for channel in self.channels:
             if not only or channel.instrument in only:
                 seen = seen.with_others(self._simulated_alone(station, channel.instrument))
@@ -270,6 +290,8 @@ class Comparison:
         cosine: dict[str, FloatArray] = {}
         series: dict[str, FloatArray] = {}
         statistics: dict[str, FloatArray] = {}
+        levels: dict[str, FloatArray] = {}
+        mean_speed = float(np.mean(self.speed))
         for channel in self.channels:
             if channel.instrument not in (pulses if channel.kind == "rotor_rate" else angles):
                 continue
@@ -278,7 +300,12 @@ class Comparison:
                 assert isinstance(rotor, Rotor)
                 values = rate_series(pulses[channel.instrument], rotor, self.grid)
                 intervals = interval_statistics(
-                    pulses[channel.instrument], rotor, self.wind_from, self.grid, self.mask
+                    pulses[channel.instrument],
+                    rotor,
+                    self.wind_from,
+                    self.speed,
+                    self.grid,
+                    self.mask,
                 )
                 full = spectra.to_cosine(self.masked(values - np.mean(values)))
                 full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
@@ -307,7 +334,8 @@ class Comparison:
                 )
             series[channel.name] = values
             cosine[channel.name] = full[: self.coefficients]
-        return Simulated(cosine, series, statistics)
+            levels[channel.name] = activity.levels(values, channel, mean_speed, self.grid)
+        return Simulated(cosine, series, statistics, levels, self.unseen.counted)
 
     def _nearest_turn(
         self, channel: Channel, deviation: FloatArray, time: FloatArray | None = None
@@ -375,7 +403,7 @@ class Comparison:
         )  # fmt: skip
 
     def vector(self, simulated: Simulated, trust: Mapping[str, Trust]) -> FloatArray:
-        """Whitened differences of all channels, then of all statistics."""
+        """Whitened differences of all channels, of all statistics, of all activities."""
         parts = []
         for channel in self.channels:
             t = trust[channel.name]
@@ -391,14 +419,29 @@ class Comparison:
                 - t.statistics_mean
             )
             parts.append(np.nan_to_num(difference / t.statistics_deviation))
+        for channel in self.channels:
+            name = channel.name
+            change = self.measured.activity(name) - simulated.activity(name)
+            parts.append(change / self._activity_deviation(trust[name]))
         return np.concatenate(parts)
+
+    def _activity_deviation(self, trust: Trust) -> FloatArray:
+        """Deviation of each activity, flat."""
+        return np.repeat(trust.activity_deviation, self.measured.counted.size)
 
     @property
     def channel_of_each(self) -> npt.NDArray[np.int_]:
         """Number of the channel to which each of what is compared belongs, shape (l,)."""
         numbers = np.arange(len(self.channels))
         sizes = [self.measured.statistics[c.name].size for c in self.channels]
-        return np.concatenate((np.repeat(numbers, self.coefficients), np.repeat(numbers, sizes)))
+        activities = [self.measured.levels[c.name].size for c in self.channels]
+        return np.concatenate(
+            (
+                np.repeat(numbers, self.coefficients),
+                np.repeat(numbers, sizes),
+                np.repeat(numbers, activities),
+            )
+        )
 
     def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
         """How far `vector` falls when what is compared rises by one, shape (l,)."""
@@ -407,6 +450,7 @@ class Comparison:
             seen = np.isfinite(self.measured.statistics[channel.name])
             deviation = trust[channel.name].statistics_deviation
             parts.append(np.where(seen, 1.0 / deviation, 0.0))
+        parts.extend(1.0 / self._activity_deviation(trust[c.name]) for c in self.channels)
         return np.concatenate(parts)
 
     def residual_series(

@@ -27,6 +27,7 @@ REMAINDER_SCORES = {
     "frequency": 60.0,
     "statistic": 45.0,
     "spectrum": 30.0,
+    "activity": 30.0,
     "time": 30.0,
     "direction": 30.0,
     "heading": 30.0,
@@ -36,6 +37,9 @@ REMAINDER_SCORES = {
 """Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
 raise the power of a band on healthy days, too; a named effect leaves less than this where its form
 may differ from the simulation's."""
+
+STIRRED_KINDS = frozenset({"frequency", "spectrum", "activity"})
+"""Of these an effect that brings eddies of its own leaves more than the simulation knows."""
 
 REMAINDER_SCORE = 0.8
 REMAINDER_SHARE = 0.025
@@ -108,7 +112,7 @@ def remainder_of(
         channels = {c.name for c in comparison.channels if c.instrument in reached}
         stirred = any(term.effect.stirs for term in naming.fit.terms)
         counts = [
-            r.channel in channels and not (stirred and r.kind in {"frequency", "spectrum"})
+            r.channel in channels and not (stirred and r.kind in STIRRED_KINDS)
             for r in bank.regions
         ]
         scores = np.where(counts, scores, 0.0)

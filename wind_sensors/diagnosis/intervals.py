@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
 from wind_sensors.diagnosis.fitting import Interval
 
@@ -73,7 +73,7 @@ def cell_signatures(
 ) -> FloatArray:
     """Noise-whitened signatures of an effect that holds between neighbouring cuts only.
 
-    Spectra and interval statistics take the share of the time.
+    Spectra and interval statistics take the share of the time, the activity its segments.
 
     Args:
         comparison: The recording.
@@ -102,6 +102,16 @@ def cell_signatures(
         moved = planted.statistics[name] - without.statistics[name]
         white = np.nan_to_num(moved / trust[name].statistics_deviation)
         parts.append(share[:, None] * white)
+    number = activity.segments_of(comparison.grid)
+    size = np.bincount(number)
+    there = np.array([np.bincount(number, within, size.size) / size for within in inside])
+    for channel in comparison.channels:
+        name = channel.name
+        risen = planted.levels[name] - without.levels[name]
+        each = activity.contrasts(there[:, None, :] * risen, planted.counted)
+        parts.append(
+            (each / trust[name].activity_deviation[:, None]).reshape(cells, -1)
+        )
     return np.concatenate(parts, axis=1)
 
 

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import (
     FREQUENCIES,
     Baseline,
     ChannelBaseline,
+    daily_deviation,
     default_channel,
-    statistics_prior,
 )
+from wind_sensors.diagnosis.calibrated_range import is_calm
 from wind_sensors.diagnosis.comparison import LOW_END, Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, with_effect
@@ -54,11 +55,19 @@ _PRIOR_STRENGTH = 3.0
 
 _STANDING_FACTOR = 1.3
 
+USUAL_ACTIVITY_EXCESS = 1.5
+ACTIVITY_PRIOR_STRENGTH = 8.0
+FEW_SEGMENTS = 4
+"""Excess of the scatter of levels, its weight in groups of segments, and so many in a group."""
+
 STANDING_MEAN_PRIOR = 0.7
 """Prior deviation of the shared amplitudes, in templates."""
 
 SELDOM = 0.1
 """Winds below this quantile are too rare in healthy recordings to say what is normal."""
+
+FEWEST_DAYS = 3
+"""Of fewer healthy recordings nobody knows how loud they may be."""
 
 LARGEST_SHARED_BANK = 4
 """Effects with more templates than this have no shared amplitude, only a scatter."""
@@ -118,7 +127,7 @@ def _statistics(
 ) -> tuple[FloatArray, FloatArray]:
     """Mean and deviation of measured minus simulated statistics, shrunk towards the prior."""
     channel = next(c for c in channels_of(station) if c.name == name)
-    prior = statistics_prior(channel)
+    prior = daily_deviation(channel)
     rows = np.array(
         [
             c.measured.statistics[name] - c.simulate(station).statistics[name]
@@ -134,6 +143,35 @@ def _statistics(
     variance = (squares + _PRIOR_STRENGTH * prior**2) / (count + _PRIOR_STRENGTH - 1.0)
     variance = variance * (1.0 + 1.0 / (count + 0.25))
     return mean, np.sqrt(variance)
+
+
+def _activity_excess(
+    comparisons: Sequence[Comparison], station: Station, name: str
+) -> FloatArray:
+    """Variance of the levels of quick eddies over that of as many independent coefficients.
+
+    Of single segments or of means of a few, whichever scatter more: what lasts for minutes on
+    healthy days looks like what begins inside a record.
+    """
+    channel = next(c for c in channels_of(station) if c.name == name)
+    totals = np.full((2, activity.BANDS), ACTIVITY_PRIOR_STRENGTH * USUAL_ACTIVITY_EXCESS)
+    weights = np.full((2, activity.BANDS), ACTIVITY_PRIOR_STRENGTH)
+    for comparison in comparisons:
+        counted = comparison.measured.counted
+        change = comparison.measured.levels[name] - comparison.simulate(station).levels[name]
+        change = activity.contrasts(change, counted)[:, counted]
+        speed = float(np.mean(comparison.speed))
+        sampling = activity.sampling_variance(channel, speed, comparison.grid)
+        seen = np.isfinite(sampling)
+        for k, together in enumerate((1, FEW_SEGMENTS)):
+            groups = change.shape[1] // together
+            if groups < 2:
+                continue
+            means = change[:, : groups * together].reshape(-1, groups, together).mean(axis=2)
+            squares = together * np.sum(means**2, axis=1) / np.where(seen, sampling, 1.0)
+            totals[k] += np.where(seen, squares, 0.0)
+            weights[k] += np.where(seen, groups - 1.0, 0.0)
+    return np.asarray(np.max(totals / weights, axis=0))
 
 
 def _noise(
@@ -310,11 +348,14 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
     return out
 
 
-def loudest_gains(rows: Sequence[Evidence]) -> dict[str, float]:
+def loudest_gains(
+    rows: Sequence[Evidence], calm: Sequence[bool] | None = None
+) -> dict[str, float]:
     """Largest gains that effects promise in a healthy recording judged by the others.
 
     Args:
         rows: Of each healthy recording.
+        calm: Which of them say nothing of a windy day; None, or too few others: none.
 
     Returns:
         By instrument (or `station`, `platform`), drop of the cost beyond what the parameters cost;
@@ -322,9 +363,13 @@ def loudest_gains(rows: Sequence[Evidence]) -> dict[str, float]:
         granted, as the search does.
     """
     loudest: dict[str, float] = {}
-    if len(rows) < 3:
+    if len(rows) < FEWEST_DAYS:
         return loudest
-    for left_out, row in enumerate(rows):
+    counted = list(range(len(rows)))
+    if calm is not None and calm.count(False) >= FEWEST_DAYS:
+        counted = [k for k in counted if not calm[k]]
+    for left_out in counted:
+        row = rows[left_out]
         others = [r for k, r in enumerate(rows) if k != left_out]
         means, sizes = standing_means(others), standing_sizes(others, standing_means(others))
         own = row.probes[: len(row.keys)]
@@ -390,6 +435,7 @@ def learn(
                 statistics_deviation=deviation,
                 noise_mean=noise_mean,
                 noise_deviation=noise_deviation,
+                activity_excess=_activity_excess(of(name), current, name),
             )
         return replace(known, channels=channels)
 
@@ -414,7 +460,8 @@ def learn(
     return replace(
         baseline,
         usual_wind=float(np.quantile(speeds, SELDOM)),
-        loudest=loudest_gains(rows),
+        loudest=loudest_gains(rows, [is_calm(c) for c in comparisons]),
+        loudest_in_calm=loudest_gains(rows),
         recordings=tuple(r.name for r in recordings),
         means=means,
         standing=standing_sizes(rows, means),

@@ -7,6 +7,7 @@ import numpy.typing as npt
 from scipy.stats import ttest_1samp
 
 from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.activity import segments_of
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term
 from wind_sensors.diagnosis.search import Searcher
@@ -60,7 +61,7 @@ def is_steady(comparison: Comparison, before: Fit, after: Fit) -> bool:
 
 
 def gain_in_parts(comparison: Comparison, before: Fit, after: Fit, width: int) -> FloatArray:
-    """How much of a gain each part of the record brings, statistics aside.
+    """How much of a gain each part of the record brings, statistics of the whole aside.
 
     Args:
         comparison: The recording.
@@ -76,6 +77,13 @@ def gain_in_parts(comparison: Comparison, before: Fit, after: Fit, width: int) -
             white[:n] = fitted.vector[k * n : (k + 1) * n]
             squares = spectra.from_cosine(white)[: parts * width] ** 2
             gain += sign * squares.reshape(parts, width).sum(axis=1)
+    counted = comparison.measured.counted.size
+    number = segments_of(comparison.grid)
+    of_activity = sum(comparison.measured.levels[c.name].size for c in comparison.channels)
+    if of_activity:
+        drop = before.vector[-of_activity:] ** 2 - after.vector[-of_activity:] ** 2
+        each = drop.reshape(-1, counted).sum(axis=0) / np.bincount(number)
+        gain += each[number][: parts * width].reshape(parts, width).sum(axis=1)
     return gain
 
 

@@ -348,10 +348,16 @@ def _smallness(turns: FloatArray, usual: FloatArray, shares: tuple[float, ...]) 
     return np.asarray(np.log(small / reach), dtype=np.float64)
 
 
+SLOW_TURN = 2.5
+"""A rotor that takes so many times longer for its turns than the wind asks for is about to stop:
+its intervals tell of the wind that it stops in."""
+
+
 def interval_statistics(
     pulses: Pulses,
     rotor: Cup | Propeller,
     direction: FloatArray,
+    speed: FloatArray,
     grid: Grid,
     mask: FloatArray | None = None,
 ) -> FloatArray:
@@ -361,7 +367,8 @@ def interval_statistics(
         pulses: Edges.
         rotor: The rotor.
         direction: Direction of the wind in the plane of rotation at the bins' centres [rad].
-        grid: Bins of `direction`.
+        speed: Slow wind speed at the bins [m/s]; what turns far slower does not count.
+        grid: Bins of both.
         mask: Weight of the bins; intervals where it is below a half do not count.
 
     Returns:
@@ -371,14 +378,21 @@ def interval_statistics(
         revolution locked to the wind's direction (0 where the pulses are too few to tell).
     """
     weight = np.ones(grid.n) if mask is None else mask
+    usual = 2.0 * np.pi * rotor.calibration_distance / np.maximum(speed, 0.1)
+    longest = SLOW_TURN * usual / rotor.pulses_per_revolution
     return _interval_statistics(
-        grid.seconds(pulses.time), rotor.pulses_per_revolution, direction, weight, grid.dt
+        grid.seconds(pulses.time), rotor.pulses_per_revolution, direction, longest, weight, grid.dt
     )
 
 
 @compiled
 def _interval_statistics(
-    time: FloatArray, slots: int, direction: FloatArray, weight: FloatArray, dt: float
+    time: FloatArray,
+    slots: int,
+    direction: FloatArray,
+    longest: FloatArray,
+    weight: FloatArray,
+    dt: float,
 ) -> FloatArray:
     out = np.zeros(INTERVALS)
     edges = time.size
@@ -396,6 +410,8 @@ def _interval_statistics(
         if weight[place] <= 0.5:
             continue
         around = time[i + half + 1] - time[i - half]
+        if around > longest[place] * window:
+            continue
         interval = (time[i + 1] - time[i]) * window
         counted += 1
         if interval > 1.6 * around:
@@ -425,6 +441,8 @@ def _interval_statistics(
         if weight[place] <= 0.5:
             continue
         revolution = max(time[j + slots] - time[j], 1e-9)
+        if revolution > longest[place] * slots:
+            continue
         deviation = (time[i + 1] - time[i]) * slots / revolution - 1.0
         deviation = min(max(deviation, -0.8), 0.8)
         squares += deviation * deviation

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
+from wind_sensors.diagnosis.activity import counted_segments
 from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.counted_time import where_reference_is
 from wind_sensors.diagnosis.observation import (
@@ -85,7 +86,7 @@ def prepare(
     x, y = slowly(flow[:, 0], DIRECTION_TIME), slowly(flow[:, 1], DIRECTION_TIME)
     slow_direction = np.unwrap(np.arctan2(-y, -x))
     slow_speed = slowly(speed, SPEED_TIME)
-    empty = Simulated({}, {}, {})
+    empty = Simulated({}, {}, {}, {}, counted_segments(grid, None))
     comparison = Comparison(
         recording=recording,
         station=known,

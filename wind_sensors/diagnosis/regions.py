@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.comparison import BANDS, LOW_END, Comparison, Simulated
 from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STATISTICS, Channel
 from wind_sensors.diagnosis.whitening import Whitener
@@ -28,6 +28,9 @@ _SECTOR_WIDTHS_DEG = (10.0, 30.0, 90.0)
 _TIME_LEVELS = (2, 4, 8, 16)
 _QUANTILES = 6
 
+OF_POWER = frozenset({"frequency", "spectrum", "statistic", "activity"})
+"""Kinds of regions in which no mean of the residual tells how large the mismatch is."""
+
 
 @dataclass(frozen=True)
 class Region:
@@ -35,8 +38,8 @@ class Region:
 
     Attributes:
         channel: Name of the channel.
-        kind: `time`, `speed`, `direction`, `heading`, `temperature`, `frequency`, `statistic` or
-            `all`.
+        kind: `time`, `speed`, `direction`, `heading`, `temperature`, `frequency`, `spectrum`,
+            `statistic`, `activity` or `all`.
         low, high: Bounds: s, m/s, degrees clockwise from north (or from the bow), deg C, Hz.
         label: For people.
     """
@@ -131,7 +134,8 @@ class RegionBank:
     """White signatures of a shift in each region, and the null of their maximum.
 
     Attributes:
-        regions: The regions with signatures, then the frequency bands, then the statistics.
+        regions: The regions with signatures (in series, then in activities), then the frequency
+            bands, then the statistics.
         signatures: Unit vectors, one a row, for the first regions.
         bands: Start and stop in the white vector for each frequency band.
         statistics: Place in the white vector for each statistic.
@@ -194,9 +198,7 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
     regions: list[Region] = []
     rows: list[FloatArray] = []
     bands: list[tuple[Region, tuple[int, int]]] = []
-    total = sum(n for _ in comparison.channels) + sum(
-        comparison.measured.statistics[c.name].size for c in comparison.channels
-    )
+    total = whitener.of(simulated).size
     for number, channel in enumerate(comparison.channels):
         trust = whitener.trust[channel.name]
         scale = comparison.speed
@@ -210,13 +212,23 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
                 regions.append(Region(channel.name, kind, low, high, label))
                 rows.append(white / length)
         bands.extend(_frequency_regions(comparison, channel, number * n))
+    for region, row in _activity_regions(whitener, total):
+        white = whitener.through_standing(row)
+        length = float(np.linalg.norm(white))
+        if length > _WEAKEST:
+            regions.append(region)
+            rows.append(white / length)
     statistics: list[tuple[Region, int]] = []
     place = n * len(comparison.channels)
     for channel in comparison.channels:
         size = comparison.measured.statistics[channel.name].size
         for k in range(size):
             kind = "spectrum" if k < BANDS else "statistic"
-            label = eddies(channel, k) if k < BANDS else STATISTICS[channel.kind][k - BANDS]
+            label = (
+                eddies(channel, NORMALISED_BANDS[k : k + 2])
+                if k < BANDS
+                else STATISTICS[channel.kind][k - BANDS]
+            )
             statistics.append(
                 (Region(channel.name, kind, float(k), float(k + 1), label), place + k)
             )
@@ -237,9 +249,38 @@ def region_bank(whitener: Whitener, simulated: Simulated, seed: int = 1) -> Regi
     return RegionBank(bank.regions, bank.signatures, bank.bands, bank.statistics, null)
 
 
-def eddies(channel: Channel, band: int) -> str:
-    """What a band of a channel's spectrum shows, for people."""
-    longest, shortest = 2.0 * np.pi * channel.length / NORMALISED_BANDS[band : band + 2]
+def _activity_regions(whitener: Whitener, total: int) -> Iterator[tuple[Region, FloatArray]]:
+    """Levels of quick eddies that rise in a part of the time, with the rise, noise-whitened."""
+    comparison = whitener.comparison
+    counted = comparison.measured.counted
+    at = (np.arange(counted.size) + 0.5) * activity.SEGMENT
+    length = comparison.grid.n * comparison.grid.dt
+    place = total - sum(comparison.measured.levels[c.name].size for c in comparison.channels)
+    for channel in comparison.channels:
+        for band, deviation in enumerate(whitener.trust[channel.name].activity_deviation):
+            for parts in _TIME_LEVELS[:-1]:
+                for k in range(parts):
+                    low, high = k * length / parts, (k + 1) * length / parts
+                    inside = ((at >= low) & (at < high)).astype(float)
+                    row = np.zeros(total)
+                    rise = activity.contrasts(inside, counted) / deviation
+                    row[place : place + counted.size] = rise
+                    label = (
+                        f"{eddies(channel, activity.EDGES[band : band + 2])} "
+                        f"from {low:.0f} to {high:.0f} s"
+                    )
+                    yield Region(channel.name, "activity", low, high, label), row
+            place += counted.size
+
+
+def eddies(channel: Channel, edges: FloatArray) -> str:
+    """What a band of a channel's spectrum shows, for people.
+
+    Args:
+        channel: The channel.
+        edges: Of the band, in k times its length, shape (2,).
+    """
+    longest, shortest = 2.0 * np.pi * channel.length / edges
     return f"power of eddies of {shortest:.3g} to {longest:.3g} m"
 
 
@@ -253,7 +294,7 @@ def excess_in(
         series, unit = np.degrees(series / comparison.speed), "deg"
     else:
         unit = "m/s"
-    if region.kind in {"frequency", "spectrum", "statistic"}:
+    if region.kind in OF_POWER:
         return float(np.std(series)), unit
     for kind, low, high, _, inside in masks(comparison):
         if (kind, low, high) == (region.kind, region.low, region.high):

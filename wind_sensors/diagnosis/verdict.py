@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.calibrated_range import is_too_calm, need_calibration, too_calm
+from wind_sensors.diagnosis.calibrated_range import is_calm, is_too_calm, need_calibration, too_calm
 from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.contradictions import (
     is_discordant,
@@ -36,7 +36,7 @@ from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
 from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
 from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.regions import Found, RegionBank, region_bank, strongest
+from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates
 from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
 from wind_sensors.diagnosis.support import (
@@ -93,12 +93,12 @@ class Diagnosis:
 
 def _structured(found: list[Found]) -> list[Found]:
     """Regions of time, speed and direction before those of spectra and statistics."""
-    return sorted(found, key=lambda f: f.region.kind in {"frequency", "spectrum", "statistic"})
+    return sorted(found, key=lambda f: f.region.kind in OF_POWER)
 
 
 def _description(found: Found) -> str:
     channel = found.region.channel
-    if found.region.kind in {"spectrum", "statistic", "frequency"}:
+    if found.region.kind in OF_POWER:
         return f"{channel}: {found.region.label} differs from the simulation"
     sign = "above" if found.excess > 0.0 else "below"
     return (
@@ -238,6 +238,8 @@ def diagnose(
 
     baseline = baseline.for_station(recording.station)
     comparison = prepare(recording, baseline.station, baseline.place)
+    if is_calm(comparison):
+        baseline = baseline.in_calm()
     searcher, naming = _explained(comparison, baseline, known, workers, report)
     if naming.fit.terms:
         rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]

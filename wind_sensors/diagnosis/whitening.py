@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline
 from wind_sensors.diagnosis.comparison import (
     LOW_END,
@@ -75,6 +75,11 @@ def _trust(
         deviation=np.sqrt(variance + SMALLEST_DEVIATION**2),
         statistics_mean=known.statistics_mean,
         statistics_deviation=known.statistics_deviation,
+        activity_deviation=known.activity_deviation(
+            activity.sampling_variance(
+                channel, float(np.mean(comparison.speed)), comparison.grid
+            )
+        ),
     )
 
 
@@ -132,7 +137,14 @@ class Whitener:
 
 FORM_ERROR = 0.1
 """Standard deviation, relative to a named effect's own signature, of what its true form adds to
-the simulated one: in each part of the wind's range, each band, each statistic."""
+the simulated one: in each part of the wind's range and each band."""
+
+STATISTIC_FORM_ERROR = 0.3
+"""The same in each statistic: how a rotor that hardly turns, or a worn cup, spreads its pulses is
+simulated less exactly than how fast it turns."""
+
+NEGLIGIBLE = 1e-4
+"""Squared length of a noise-whitened difference that changes nothing."""
 _FORM_BANDS = (0.0, 0.01, 0.05, 0.2, 1.25)
 
 
@@ -160,15 +172,16 @@ def form_signatures(
     n = comparison.coefficients
     sizes = [n] * len(comparison.channels)
     sizes += [comparison.measured.statistics[c.name].size for c in comparison.channels]
+    sizes += [comparison.measured.levels[c.name].size for c in comparison.channels]
     starts = np.concatenate(([0], np.cumsum(sizes)))
     frequency = spectra.cosine_frequencies(comparison.grid.n, comparison.grid.dt)[:n]
     rows: list[FloatArray] = []
 
     def add(place: int, values: FloatArray) -> None:
-        if float(values @ values) < 1e-2:
+        if float(values @ values) < NEGLIGIBLE:
             return
         row = np.zeros(starts[-1])
-        row[starts[place] : starts[place + 1]] = FORM_ERROR * values
+        row[starts[place] : starts[place + 1]] = values
         rows.append(row)
 
     for k, channel in enumerate(comparison.channels):
@@ -179,15 +192,23 @@ def form_signatures(
         if np.any(change):
             for weight in _wind_parts(comparison):
                 part = spectra.to_cosine(comparison.masked(change * weight))[:n]
-                add(k, scale * part)
+                add(k, FORM_ERROR * scale * part)
             whole = scale * (corrected.cosine[name] - without.cosine[name])
             for low, high in itertools.pairwise(_FORM_BANDS):
-                add(k, np.where((frequency >= low) & (frequency < high), whole, 0.0))
+                add(k, np.where((frequency >= low) & (frequency < high), FORM_ERROR * whole, 0.0))
         shift = np.nan_to_num(
             (corrected.statistics[name] - without.statistics[name]) / t.statistics_deviation
         )
         for j in np.flatnonzero(shift):
-            add(len(comparison.channels) + k, np.where(np.arange(shift.size) == j, shift, 0.0))
+            add(
+                len(comparison.channels) + k,
+                np.where(np.arange(shift.size) == j, STATISTIC_FORM_ERROR * shift, 0.0),
+            )
+        risen = corrected.activity(name) - without.activity(name)
+        for band, deviation in enumerate(t.activity_deviation):
+            inside = np.arange(risen.size) // without.counted.size == band
+            whitened = np.where(inside, risen / deviation, 0.0)
+            add(2 * len(comparison.channels) + k, STATISTIC_FORM_ERROR * whitened)
     return np.array(rows) if rows else np.zeros((0, int(starts[-1])))
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.baseline import ChannelBaseline
 from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
-from wind_sensors.diagnosis.observation import STATISTICS, Channel
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STATISTICS, Channel
 from wind_sensors.diagnosis.regions import eddies
 from wind_sensors.report import style
 
@@ -161,7 +161,8 @@ def statistics_figure(
     if not np.any(np.abs(before[shown]) > _TELLING):
         return None
     after = before if corrected is None else departures(corrected)
-    labels = [*(eddies(channel, k) for k in range(BANDS)), *STATISTICS[channel.kind]]
+    bands = [eddies(channel, NORMALISED_BANDS[k : k + 2]) for k in range(BANDS)]
+    labels = [*bands, *STATISTICS[channel.kind]]
     with style.house():
         made = Figure(figsize=(9.0, 1.1 + 0.27 * shown.size), layout="constrained")
         axes = made.add_subplot()

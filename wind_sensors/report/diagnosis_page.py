@@ -12,7 +12,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.findings import Estimate, Finding
 from wind_sensors.diagnosis.fitting import ALWAYS
 from wind_sensors.diagnosis.proof import Proof
-from wind_sensors.diagnosis.regions import Found
+from wind_sensors.diagnosis.regions import OF_POWER, Found
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.diagnosis_figures import (
     as_svg,
@@ -144,7 +144,7 @@ def _physics(finding: Finding) -> str:
 
 def _excess(found: Found) -> str:
     """The mean residual of a region; nothing of what shows in no series."""
-    if found.region.kind in {"frequency", "spectrum", "statistic"}:
+    if found.region.kind in OF_POWER:
         return ""
     return f"{number_text(found.excess)} {escape(found.unit)}; "
 

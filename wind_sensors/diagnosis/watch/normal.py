@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline
+from wind_sensors.diagnosis import activity, spectra
+from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline, station_deviation
 from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
 from wind_sensors.diagnosis.observation import Channel
 from wind_sensors.diagnosis.whitening import SMALLEST_DEVIATION
@@ -23,6 +23,9 @@ _SCATTER_BLOCKS = 5.0
 
 _BLOCK_WIDENING = 1.5
 """Scatter of a block's statistics relative to that of a quarter of an hour."""
+
+_LEAST_SCATTER = 0.25
+"""Nor is it taken to be less than this share of what stations differ by."""
 
 _MEMORY = 240.0
 """Blocks after which what was learnt fades."""
@@ -89,13 +92,15 @@ class Normal:
                 cross=w * np.sqrt(coherence),
                 noise=w * (1.0 - coherence + 0.03),
                 statistics=w * known.statistics_mean,
-                squares=_SCATTER_BLOCKS * self._prior_scatter(known) ** 2,
+                squares=_SCATTER_BLOCKS * self._prior_scatter(known, channel) ** 2,
             )
         return self.channels[name]
 
     @staticmethod
-    def _prior_scatter(known: ChannelBaseline) -> FloatArray:
-        return np.asarray(_BLOCK_WIDENING * known.statistics_deviation, dtype=np.float64)
+    def _prior_scatter(known: ChannelBaseline, channel: Channel) -> FloatArray:
+        """A block's few pulses and readings scatter by more than those of a whole record."""
+        least = _LEAST_SCATTER * station_deviation(channel)
+        return np.maximum(_BLOCK_WIDENING * known.statistics_deviation, least)
 
     def _trust(self, comparison: Comparison, simulated: Simulated, channel: Channel) -> Trust:
         state = self._of(comparison, simulated, channel)
@@ -121,6 +126,7 @@ class Normal:
             deviation=deviation,
             statistics_mean=known.statistics_mean if self.baseline.calibrated else usual,
             statistics_deviation=np.sqrt(state.squares / (state.blocks + _SCATTER_BLOCKS)),
+            activity_deviation=np.full(activity.BANDS, np.inf),
         )
 
     def learn(self, comparison: Comparison, simulated: Simulated, residual: FloatArray) -> None:
