@@ -7,9 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis import activity
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.fitting import Term, planted
 from wind_sensors.diagnosis.observation import Channel, Grid
+from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.search import searcher_of
 
 CUP = Channel("cup/rotor_rate", "cup", "rotor_rate", length=2.0)
 GRID = Grid(start=0, dt=0.2, n=4510)
@@ -74,3 +79,62 @@ def test_contrasts_know_no_common_level(
     assert np.all(found[:, ~counted] == 0.0)
     assert np.abs(found.sum(axis=1)).max() < 1e-9
     assert activity.contrasts(level + common, counted) == pytest.approx(found, abs=1e-9)
+
+
+@given(st.floats(-50.0, 50.0), st.floats(0.0, 50.0))
+def test_large_differences_count_less_but_never_fall(low: float, step: float) -> None:
+    small, large = activity.compressed(np.array([low, low + step]))
+    assert small <= large
+    assert abs(small) <= abs(low)
+    assert activity.compressed(np.array([-low])) == pytest.approx(-small)
+    assert activity.compressed(np.array([0.5])) == pytest.approx(0.5, rel=0.02)
+
+
+def test_what_all_instruments_share_is_found_among_their_own_noise() -> None:
+    rng = np.random.default_rng(8)
+    counted = np.ones(30, dtype=np.bool_)
+    slow = activity.waves(counted, activity.USUAL_LIVELINESS)
+    drawn = rng.normal(size=activity.WAVES)
+    variances = np.array([0.02, 0.05, np.inf, 0.04])
+    noise = np.sqrt(np.where(np.isinf(variances), 1.0, variances))[:, None]
+    changes = activity.contrasts(drawn @ slow + noise * rng.normal(size=(4, 30)), counted)
+    sizes, unknown = activity.shared_waves(changes, variances, counted)
+    away = (sizes - drawn) @ np.linalg.solve(unknown, sizes - drawn)
+    assert 1.0 < away < 25.0
+    # Without any band that is seen, everything is as unknown as it was before.
+    sizes, unknown = activity.shared_waves(changes, np.full(4, np.inf), counted)
+    assert np.all(sizes == 0.0)
+    assert unknown == pytest.approx(np.eye(activity.WAVES))
+
+
+def test_a_change_of_all_instruments_is_the_winds_and_of_one_is_its_own() -> None:
+    """The reference comes into a lee for a while: both instruments are livelier than it says."""
+    searcher = searcher_of(prepare(recorded(STATION, 9)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    comparison = searcher.comparison
+    counted = comparison.measured.counted
+    later = activity.contrasts((np.arange(counted.size) >= 0.5 * counted.size) * 1.0, counted)
+
+    def length_of(livelier: dict[str, float]) -> tuple[float, float]:
+        rises = [livelier[c.name] * np.tile(later, activity.BANDS) for c in comparison.channels]
+        change = np.zeros(comparison.channel_of_each.size)
+        change[-sum(r.size for r in rises) :] = np.concatenate(rises)
+        noise = np.nan_to_num(change * comparison.weights(null.trust))
+        white = null.of_changes(change)
+        return float(noise @ noise), float(white @ white)
+
+    cup, vane = (c.name for c in comparison.channels)
+    both, both_left = length_of({cup: 0.3, vane: 0.3})
+    one, one_left = length_of({cup: 0.3, vane: -0.3})
+    assert one == pytest.approx(both)
+    assert both_left < 0.3 * both
+    assert one_left > 2.0 * both_left
+
+
+def test_where_a_rotor_stands_still_eddies_do_not_count() -> None:
+    sticky = {"friction_speed": 3.0, "temperature_coefficient": 0.0, "breakaway": 1.0}
+    braked = planted(STATION, [Term(catalogue()["bearing_friction"], "cup", sticky)])
+    healthy = prepare(recorded(STATION, 9, mean=3.0)).measured.counted
+    halted = prepare(recorded(braked, 9, mean=3.0)).measured.counted
+    assert healthy.mean() > 0.9
+    assert halted.mean() < 0.5

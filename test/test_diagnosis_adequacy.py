@@ -9,7 +9,12 @@ import pytest
 from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.acceptance import PASSING_FORM_GAIN, PASSING_GAIN, passing_gain
+from wind_sensors.diagnosis.acceptance import (
+    PASSING_FORM_GAIN,
+    PASSING_GAIN,
+    is_plausible,
+    passing_gain,
+)
 from wind_sensors.diagnosis.contradictions import is_uneven
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
@@ -233,6 +238,7 @@ def test_two_effects_must_stand_out_one_by_one(
         (OFFSET, ALWAYS, 0.6, 0.002, False),
         (OFFSET, (300.0, None), 0.3, 0.002, True),
         (OFFSET, (300.0, None), 0.3, 0.4, False),
+        (OFFSET, (300.0, None), -0.1, 0.002, False),
         (("wake_shadow", "cup"), ALWAYS, 0.3, 0.002, True),
     ],
 )
@@ -367,3 +373,9 @@ def test_a_fit_with_derivatives_carried_along_ends_where_an_exact_one_does() -> 
          found.terms[1].values["time_constant"]],
         best.x, rtol=0.03,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(("width", "possible"), [(12.0, True), (38.0, True), (40.0, False)])
+def test_a_wake_as_wide_as_the_search_allows_is_none(width: float, possible: bool) -> None:
+    values = {"bearing_from": 200.0, "depth": 0.3, "width": width, "flank": 0.0}
+    assert is_plausible(Term(catalogue()["wake_shadow"], "cup", values)) is possible

@@ -64,8 +64,9 @@ def test_cells_add_up_to_what_the_effect_changes_all_the_time() -> None:
     changed = comparison.simulate(planted(STATION, [heavy]))
     cuts = np.array([0.0, 45.0, 130.0, 131.0, comparison.grid.n * comparison.grid.dt])
     cells = cell_signatures(comparison, without, changed, null.trust, cuts)
-    # `vector` is measured minus simulated: the change enters with its sign turned.
-    whole = null.noise_whitened(without) - null.noise_whitened(changed)
+    channels = comparison.channels
+    change = changed.flat(channels) - without.flat(channels)
+    whole = np.nan_to_num(change * comparison.weights(null.trust))
     assert cells.sum(axis=0) == pytest.approx(whole, abs=1e-6)
     activities = sum(without.levels[c.name].size for c in comparison.channels)
     assert np.abs(cells[:, -activities:]).max() > 1.0

@@ -142,8 +142,13 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
         return np.inf
     nothing = whitener.of(searcher.bank.without)
     own = inexact(current, float(nothing @ nothing)) * overlap(searcher, current, longer)
+    return times_beside(further) * own
+
+
+def times_beside(further: Term) -> float:
+    """How many times the inexactness of other effects a further one on the same signals brings."""
     passing = further.interval != ALWAYS and not further.effect.legible
-    return PASSING_BESIDE * own if passing else own
+    return PASSING_BESIDE if passing else 1.0
 
 
 def inexact(current: Fit, nothing: float) -> float:
@@ -245,9 +250,13 @@ def is_plausible(term: Term) -> bool:
     if not large_enough(term):
         return False
     for parameter in term.effect.parameters:
+        margin = 0.02 * (parameter.high - parameter.low)
+        shapes = parameter.healthy is None and not parameter.wraps and parameter.low > 0.0
+        if shapes and term.values[parameter.name] > parameter.high - margin:
+            # A wake as wide as half the horizon is none.
+            return False
         if not parameter.graded or parameter.healthy is None or parameter.minimum <= 0.0:
             continue
-        margin = 0.02 * (parameter.high - parameter.low)
         reach = 0.85 * (parameter.high - 1.0)
         if parameter.healthy == 1.0 and term.values[parameter.name] > 1.0 + reach:
             return False

@@ -30,6 +30,16 @@ HIGHEST = 0.45
 FEWEST = 12
 """Coefficients in a band of a segment, below which its power says nothing."""
 
+WAVES = 8
+USUAL_LIVELINESS = 0.2
+"""Slow changes of the eddies' power that all instruments share, as waves over the record, and the
+standard deviation of the slowest (of the logarithm): the reference stands elsewhere, now and then
+in another thing's wake. Waves half as long have half the variance. On healthy days of masts on land
+the instruments agree on them to some percent."""
+
+OUTLYING = 2.0
+"""Differences of more standard deviations than this count less than in proportion."""
+
 RESOLUTION = 0.02
 """Fluctuations below this [m/s] are as good as none."""
 
@@ -90,6 +100,12 @@ def levels(
     return out
 
 
+def compressed(deviations: FloatArray) -> FloatArray:
+    """Differences in standard deviations, large ones pulled in: the power of quick eddies has rare
+    large outliers on healthy days (a vane in a lull), which a few segments must not decide by."""
+    return np.asarray(OUTLYING * np.arcsinh(deviations / OUTLYING))
+
+
 def contrasts(level: FloatArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
     """Levels (or changes of them) beyond their mean over the segments that count; zero in others.
 
@@ -101,3 +117,42 @@ def contrasts(level: FloatArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
         return np.zeros_like(level)
     mean = level[..., counted].mean(axis=-1, keepdims=True)
     return np.asarray(np.where(counted, level - mean, 0.0))
+
+
+def waves(counted: npt.NDArray[np.bool_], liveliness: float) -> FloatArray:
+    """Slow changes beyond their mean over the segments that count, each of one standard deviation.
+
+    Args:
+        counted: Segments that count, shape (segments,).
+        liveliness: Standard deviation of the slowest.
+
+    Returns:
+        Shape (WAVES, segments).
+    """
+    at = (np.arange(counted.size) + 0.5) / counted.size
+    number = np.arange(1, WAVES + 1)[:, None]
+    return contrasts(liveliness / np.sqrt(number) * np.cos(np.pi * number * at), counted)
+
+
+def shared_waves(
+    changes: FloatArray,
+    variances: FloatArray,
+    counted: npt.NDArray[np.bool_],
+    liveliness: float = USUAL_LIVELINESS,
+) -> tuple[FloatArray, FloatArray]:
+    """What all instruments' levels share of their changes over a record.
+
+    Args:
+        changes: Of every band of every instrument, beyond their means, shape (k, segments).
+        variances: Of each, infinite where unseen, shape (k,).
+        counted: Segments that count, shape (segments,).
+        liveliness: Standard deviation of the slowest wave.
+
+    Returns:
+        Sizes of the waves in standard deviations, and the covariance of what is not known of
+        them, shapes (WAVES,) and (WAVES, WAVES).
+    """
+    slow = waves(counted, liveliness)
+    precision = 1.0 / variances
+    unknown = np.linalg.inv(precision.sum() * slow @ slow.T + np.eye(WAVES))
+    return unknown @ slow @ (precision @ changes), unknown

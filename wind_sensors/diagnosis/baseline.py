@@ -128,6 +128,8 @@ class Baseline:
             (or of the `station`, the `platform`) promises in one healthy recording judged by the
             others; calm ones aside.
         loudest_in_calm: The same, calm ones among them.
+        liveliness: Standard deviation of the slowest change, over a recording, of the power of
+            quick eddies (its logarithm) that all channels share.
         usual_wind: Wind speed [m/s] that healthy recordings exceed nearly all the time.
         place: Where the reference stands; None: unknown.
     """
@@ -140,6 +142,7 @@ class Baseline:
     standing: Mapping[str, float] = field(default_factory=dict)
     loudest: Mapping[str, float] = field(default_factory=dict)
     loudest_in_calm: Mapping[str, float] = field(default_factory=dict)
+    liveliness: float = activity.USUAL_LIVELINESS
     usual_wind: float = np.inf
     place: Place | None = None
 
@@ -201,6 +204,7 @@ class Baseline:
             "standing": dict(self.standing),
             "loudest": dict(self.loudest),
             "loudest_in_calm": dict(self.loudest_in_calm),
+            "liveliness": self.liveliness,
             "usual_wind": _listed(np.array([self.usual_wind]))[0],
             "place": None if self.place is None else asdict(self.place),
         }
@@ -227,6 +231,7 @@ class Baseline:
                 standing=content["standing"],
                 loudest=content["loudest"],
                 loudest_in_calm=content.get("loudest_in_calm", content["loudest"]),
+                liveliness=content.get("liveliness", activity.USUAL_LIVELINESS),
                 usual_wind=float(_unlisted([content["usual_wind"]])[0]),
                 place=None if content.get("place") is None else Place(**content["place"]),
             )

@@ -198,7 +198,8 @@ class Comparison:
     @property
     def unseen(self) -> Simulated:
         """Nothing of any channel."""
-        return Simulated({}, {}, {}, {}, activity.counted_segments(self.grid, self.mask))
+        counted = self.measured.counted & activity.counted_segments(self.grid, self.mask)
+        return Simulated({}, {}, {}, {}, counted)
 
     @property
     def coefficients(self) -> int:
@@ -422,7 +423,7 @@ class Comparison:
         for channel in self.channels:
             name = channel.name
             change = self.measured.activity(name) - simulated.activity(name)
-            parts.append(change / self._activity_deviation(trust[name]))
+            parts.append(activity.compressed(change / self._activity_deviation(trust[name])))
         return np.concatenate(parts)
 
     def _activity_deviation(self, trust: Trust) -> FloatArray:

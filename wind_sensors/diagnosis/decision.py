@@ -93,6 +93,19 @@ class Remainder:
     p: float
     share: float
 
+    @property
+    def is_structure(self) -> bool:
+        """Whether there is more than healthy days show."""
+        return self.score > 1.0 and self.p < REMAINDER_P
+
+
+def located(
+    naming: Naming, bank: RegionBank, comparison: Comparison, baseline: Baseline
+) -> Remainder:
+    """What the recording shows before anything is named."""
+    score, relative = _largest(bank.scores(naming.nothing), bank, comparison, baseline)
+    return Remainder(relative, bank.p_value(score), 1.0)
+
 
 def remainder_of(
     naming: Naming, bank: RegionBank, comparison: Comparison, baseline: Baseline
@@ -116,14 +129,21 @@ def remainder_of(
             for r in bank.regions
         ]
         scores = np.where(counts, scores, 0.0)
+    score, relative = _largest(scores, bank, comparison, baseline)
+    share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
+    return Remainder(relative, bank.p_value(score), share)
+
+
+def _largest(
+    scores: FloatArray, bank: RegionBank, comparison: Comparison, baseline: Baseline
+) -> tuple[float, float]:
+    """The score that exceeds its limit most, and how many times it does."""
     loudest = {
         c.name: LOUDEST_FACTOR * baseline.loudness(c.instrument) for c in comparison.channels
     }
     limits = np.array([max(REMAINDER_SCORES[r.kind], loudest[r.channel]) for r in bank.regions])
     worst = int(np.argmax(scores / limits))
-    score = float(scores[worst])
-    share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
-    return Remainder(score / float(limits[worst]), bank.p_value(score), share)
+    return float(scores[worst]), float(scores[worst] / limits[worst])
 
 
 def with_own_noise(naming: Naming) -> set[str]:
@@ -199,11 +219,10 @@ def verdict_of(
         excess: Noise over that of healthy days.
     """
     p, share = remainder.p, remainder.share
-    structured = remainder.score > 1.0 and p < REMAINDER_P
     if is_noisy(naming, excess):
         return "unknown"
     if not naming.fit.terms:
-        if structured:
+        if remainder.is_structure:
             return "unknown"
         sizes = sorted(size for _, _, size in detectable.values())
         if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:

@@ -37,7 +37,13 @@ from wind_sensors.diagnosis.signatures import (
     templates_of,
     with_larger,
 )
-from wind_sensors.diagnosis.whitening import in_series, trust_of, unstanding, whitener_of
+from wind_sensors.diagnosis.whitening import (
+    in_series,
+    shared_liveliness,
+    trust_of,
+    unstanding,
+    whitener_of,
+)
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
 
@@ -59,6 +65,11 @@ USUAL_ACTIVITY_EXCESS = 1.5
 ACTIVITY_PRIOR_STRENGTH = 8.0
 FEW_SEGMENTS = 4
 """Excess of the scatter of levels, its weight in groups of segments, and so many in a group."""
+
+LIVELINESS_PRIOR_DAYS = 1.0
+LIVELINESS_STEPS = 10
+"""So many days' worth is what is usual of slow changes that all channels share, and steps to what
+the healthy days say of them."""
 
 STANDING_MEAN_PRIOR = 0.7
 """Prior deviation of the shared amplitudes, in templates."""
@@ -145,6 +156,64 @@ def _statistics(
     return mean, np.sqrt(variance)
 
 
+@dataclass(frozen=True)
+class _Changes:
+    """Levels of a recording's channels over the simulated ones.
+
+    Attributes:
+        of: By channel name, beyond their means, shape (bands, segments).
+        variances: Of each band, infinite where unseen, by channel name.
+        counted: Segments that count.
+    """
+
+    of: Mapping[str, FloatArray]
+    variances: Mapping[str, FloatArray]
+    counted: npt.NDArray[np.bool_]
+
+    def shared(self, liveliness: float) -> tuple[FloatArray, FloatArray]:
+        """Waves that all channels share, see `activity.shared_waves`."""
+        return activity.shared_waves(
+            np.concatenate(list(self.of.values())),
+            np.concatenate(list(self.variances.values())),
+            self.counted,
+            liveliness,
+        )
+
+    def own(self, name: str) -> FloatArray:
+        """A channel's in the segments that count, without what all share."""
+        sizes, _ = self.shared(activity.USUAL_LIVELINESS)
+        shared = sizes @ activity.waves(self.counted, activity.USUAL_LIVELINESS)
+        return np.asarray((self.of[name] - shared)[:, self.counted])
+
+
+def _changes(comparison: Comparison, station: Station) -> _Changes:
+    simulated = comparison.simulate(station)
+    counted = comparison.measured.counted
+    speed = float(np.mean(comparison.speed))
+    changes, variances = {}, {}
+    for channel in comparison.channels:
+        change = comparison.measured.levels[channel.name] - simulated.levels[channel.name]
+        changes[channel.name] = activity.contrasts(change, counted)
+        variances[channel.name] = activity.sampling_variance(channel, speed, comparison.grid)
+    return _Changes(changes, variances, counted)
+
+
+def _liveliness(comparisons: Sequence[Comparison], station: Station) -> float:
+    """Standard deviation of the slowest change of the eddies' power that all channels share.
+
+    By expectation and maximisation; the usual one counts as much as a few healthy days.
+    """
+    found = [_changes(comparison, station) for comparison in comparisons]
+    own = activity.USUAL_LIVELINESS
+    for _ in range(LIVELINESS_STEPS):
+        total = LIVELINESS_PRIOR_DAYS * activity.USUAL_LIVELINESS**2
+        for changes in found:
+            sizes, unknown = changes.shared(own)
+            total += own**2 * float(np.mean(sizes**2 + np.diag(unknown)))
+        own = float(np.sqrt(total / (LIVELINESS_PRIOR_DAYS + len(found))))
+    return own
+
+
 def _activity_excess(
     comparisons: Sequence[Comparison], station: Station, name: str
 ) -> FloatArray:
@@ -153,15 +222,11 @@ def _activity_excess(
     Of single segments or of means of a few, whichever scatter more: what lasts for minutes on
     healthy days looks like what begins inside a record.
     """
-    channel = next(c for c in channels_of(station) if c.name == name)
     totals = np.full((2, activity.BANDS), ACTIVITY_PRIOR_STRENGTH * USUAL_ACTIVITY_EXCESS)
     weights = np.full((2, activity.BANDS), ACTIVITY_PRIOR_STRENGTH)
     for comparison in comparisons:
-        counted = comparison.measured.counted
-        change = comparison.measured.levels[name] - comparison.simulate(station).levels[name]
-        change = activity.contrasts(change, counted)[:, counted]
-        speed = float(np.mean(comparison.speed))
-        sampling = activity.sampling_variance(channel, speed, comparison.grid)
+        changes = _changes(comparison, station)
+        change, sampling = changes.own(name), changes.variances[name]
         seen = np.isfinite(sampling)
         for k, together in enumerate((1, FEW_SEGMENTS)):
             groups = change.shape[1] // together
@@ -274,12 +339,20 @@ def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
     signatures = in_series(comparison, probed[: len(templates)])
     residual = comparison.vector(bank.without, trust)
     least = np.array([t.smallest_standing for t in templates])
-    whitener = whitener_of(comparison, trust, signatures, least)
+    lively = shared_liveliness(comparison, trust, baseline.liveliness)
+    shared = whitener_of(comparison, trust, lively, np.ones(len(lively)))
+    whitener = whitener_of(
+        comparison,
+        trust,
+        np.concatenate((signatures, lively)),
+        np.concatenate((least, np.ones(len(lively)))),
+    )
+    probed = shared.through_standing(probed)
     white = whitener.through_standing(signatures)
     return Evidence(
         probes=tuple(bank.templates),
         gram=probed @ probed.T,
-        seen=probed @ residual,
+        seen=probed @ shared.through_standing(residual),
         common=probed @ signatures.T,
         inner=white @ white.T,
         inner_seen=white @ whitener.through_standing(residual),
@@ -437,7 +510,8 @@ def learn(
                 noise_deviation=noise_deviation,
                 activity_excess=_activity_excess(of(name), current, name),
             )
-        return replace(known, channels=channels)
+        liveliness = _liveliness(comparisons, current)
+        return replace(known, channels=channels, liveliness=liveliness)
 
     baseline = updated(baseline, station)
     place = located(recordings, baseline)

@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.acceptance import (
     needed_gain,
     overlap,
     plausible,
+    times_beside,
 )
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
@@ -190,8 +191,11 @@ def merged(
         return current
     alone = ranked[0]
     margin = inexact(alone.fit, nothing.cost) * overlap(searcher, alone.fit, current)
-    if alone.fit.terms[0].key not in {t.key for t in current.terms}:
+    further = [t for t in current.terms if t.key != alone.fit.terms[0].key]
+    if len(further) == len(current.terms):
         margin += ACCEPTED_FURTHER_GAIN
+    else:
+        margin *= max(times_beside(t) for t in further)
     if alone.evidence < evidence(current, whitener) + margin:
         return alone.fit
     return current

@@ -211,7 +211,8 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     """The explanation with its last effect all the time, where that explains nearly as much.
 
     A fit that has to find a large effect from a small one may go astray over the whole record and
-    arrive in a part of it. An interval that the raw signals show by themselves stays.
+    arrive in a part of it. An interval that the raw signals show by themselves stays unless the
+    whole record explains clearly more.
 
     Args:
         searcher: The search.
@@ -220,12 +221,13 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     """
     newest = one.fit.terms[-1]
     read = any(guess.interval != ALWAYS for guess in searcher.guesses.get(newest.key, ()))
-    if newest.interval == ALWAYS or newest.effect.legible or read:
+    if newest.interval == ALWAYS or newest.effect.legible:
         return one
     terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
     always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
     (other,) = judged(searcher, [always], named)
-    as_well = plausible(other.fit) and other.evidence < one.evidence + ONSET_GAIN
+    allowed = -ONSET_GAIN if read else ONSET_GAIN
+    as_well = plausible(other.fit) and other.evidence < one.evidence + allowed
     return other if as_well else one
 
 

@@ -15,9 +15,11 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.acceptance import (
     ACCEPTED_FURTHER_GAIN,
+    inexact,
     is_plausible,
     large_enough,
     may_join,
+    overlap,
     plausible,
 )
 from wind_sensors.diagnosis.explanation import (
@@ -56,6 +58,8 @@ def better_pair(
 ) -> Judged | None:
     """Two effects that explain clearly more than what leads, without it; None: there are none.
 
+    With more parameters than it they also bring what its own inexactness is worth.
+
     Args:
         searcher: The search.
         whitener: The null in which `singles` were fitted.
@@ -78,10 +82,11 @@ def better_pair(
     if not ranked:
         return None
     best = ranked[0]
-    gain = total(no_terms(leader.whitener, searcher)) - total(leader.fit)
-    margin = max(CLEARLY_BETTER, EQUAL_SHARE * gain)
+    nothing = no_terms(leader.whitener, searcher)
+    margin = max(CLEARLY_BETTER, EQUAL_SHARE * (total(nothing) - total(leader.fit)))
     if best.fit.active > leader.fit.active:
-        margin = max(ACCEPTED_FURTHER_GAIN, margin)
+        own = inexact(leader.fit, nothing.cost) * overlap(searcher, leader.fit, best.fit)
+        margin = max(ACCEPTED_FURTHER_GAIN, own, margin)
     return best if best.evidence < leader.evidence - margin else None
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
-from wind_sensors.diagnosis.activity import counted_segments
+from wind_sensors.diagnosis.activity import counted_segments, segments_of
 from wind_sensors.diagnosis.comparison import Comparison, Simulated
 from wind_sensors.diagnosis.counted_time import where_reference_is
 from wind_sensors.diagnosis.observation import (
@@ -16,6 +17,7 @@ from wind_sensors.diagnosis.observation import (
     Grid,
     angle_series,
     channels_of,
+    rate_series,
 )
 from wind_sensors.diagnosis.reference_place import Place, delayed
 from wind_sensors.diagnosis.turning import slow_departure, where_vanes_follow
@@ -23,8 +25,8 @@ from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import drive_from_recording
 from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
-from wind_sensors.station.model import Station
-from wind_sensors.station.signals import Recording
+from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.signals import Angles, Pulses, Recording
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -34,6 +36,9 @@ SHORTEST = 60.0
 DIRECTION_TIME = 60.0
 SPEED_TIME = 10.0
 """Direction and speed are slow ones over these times [s]."""
+
+HARDLY_TURNS = 0.4
+"""Below this share of the rate that it should have, a rotor's eddies say nothing."""
 
 
 def prepare(
@@ -100,7 +105,13 @@ def prepare(
         place=place,
         memory=DriveMemory(drive),
     )
-    comparison = replace(comparison, expected=_expected(comparison))
+    simulated, angles = comparison.signals(known)
+    turning = _where_rotors_turn(comparison, simulated)
+    comparison = replace(
+        comparison,
+        expected=_expected(comparison, angles),
+        measured=replace(empty, counted=empty.counted & turning),
+    )
     known_wind = where_reference_is(recording, grid)
     beside = _beside_expected(comparison)
     departure = {name: slow_departure(angle, grid) for name, angle in beside.items()}
@@ -111,9 +122,31 @@ def prepare(
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
 
 
-def _expected(comparison: Comparison) -> dict[str, FloatArray]:
+def _where_rotors_turn(
+    comparison: Comparison, simulated: Mapping[str, Pulses]
+) -> npt.NDArray[np.bool_]:
+    """Segments in which no rotor nearly stands still that should turn, shape (segments,).
+
+    How lively a rotor is that stops and starts again depends on how its bearing lets go.
+    """
+    number = segments_of(comparison.grid)
+    turning = np.ones(int(number[-1]) + 1, dtype=np.bool_)
+    for channel in comparison.channels:
+        rotor = comparison.station.instrument(channel.instrument)
+        if isinstance(rotor, Rotor):
+            measured, expected = (
+                np.bincount(number, np.abs(rate_series(pulses, rotor, comparison.grid)))
+                for pulses in (
+                    comparison.recording.pulses[channel.instrument],
+                    simulated[channel.instrument],
+                )
+            )
+            turning &= measured >= HARDLY_TURNS * expected
+    return turning
+
+
+def _expected(comparison: Comparison, angles: Mapping[str, Angles]) -> dict[str, FloatArray]:
     """Simulated deviation of each vane from the slow direction [rad]."""
-    _, angles = comparison.signals(comparison.station)
     return {
         c.name: angle_series(angles[c.instrument], comparison.direction, comparison.grid)
         for c in comparison.channels

@@ -33,6 +33,7 @@ from wind_sensors.diagnosis.signatures import (
 from wind_sensors.diagnosis.whitening import (
     Whitener,
     form_signatures,
+    shared_liveliness,
     trust_of,
     whitener_of,
 )
@@ -125,14 +126,16 @@ class Searcher:
         signatures = self.bank.whitened(self.comparison, trust)
         way = self.misplaced * self.comparison.weights(trust)
         lag = np.concatenate((lag_weights(self.comparison, templates) @ signatures, way))
-        signatures = np.concatenate((signatures, lag))
-        standing = np.concatenate((standing, np.ones(len(lag))))
-        means = np.concatenate((means, np.zeros(len(lag))))
+        lively = shared_liveliness(self.comparison, trust, self.baseline.liveliness)
+        further = [lag, lively]
         if named is not None:
-            form = form_signatures(self.comparison, trust, self.bank.without, named.simulated)
-            signatures = np.concatenate((signatures, form))
-            standing = np.concatenate((standing, np.ones(len(form))))
-            means = np.concatenate((means, np.zeros(len(form))))
+            further.append(
+                form_signatures(self.comparison, trust, self.bank.without, named.simulated)
+            )
+        signatures = np.concatenate((signatures, *further))
+        added = len(signatures) - len(standing)
+        standing = np.concatenate((standing, np.ones(added)))
+        means = np.concatenate((means, np.zeros(added)))
         return whitener_of(self.comparison, trust, signatures, standing, means)
 
     def white_signatures(self, whitener: Whitener) -> FloatArray:

@@ -80,7 +80,7 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
         return True
     seldom = any(f.term.interval != ALWAYS or f.term.effect.occasional for f in findings)
     rival = -math.inf if proof.placebo_removed is None else proof.placebo_removed
-    return seldom and stands_out(findings) and proof.excess_removed >= rival
+    return seldom and stands_out(findings) and proof.excess_removed >= max(rival, 0.0)
 
 
 def determined(findings: tuple[Finding, ...]) -> bool:

@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.decision import (
     REMAINDER_P,
     Verdict,
     is_noisy,
+    located,
     remainder_of,
     unstirred,
     verdict_of,
@@ -31,7 +32,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explanation import Naming
 from wind_sensors.diagnosis.findings import Finding, Unexplained, equal_explanations, findings_of
-from wind_sensors.diagnosis.fitting import planted
+from wind_sensors.diagnosis.fitting import ALWAYS, planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
 from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
@@ -181,17 +182,23 @@ def _upheld(
     naming: Naming,
     comparison: Comparison,
     station: Station,
+    structured: bool,
 ) -> tuple[Verdict, tuple[Finding, ...], str]:
-    """Verdict and findings after what speaks against them, and what does, for people."""
+    """Verdict and findings after what speaks against them, and what does, for people.
+
+    What was only said of a part of the record, and is withdrawn, leaves nothing if the recording
+    shows no more than healthy ones do: of the many intervals some fit the swings of a healthy vane.
+    """
     if not findings:
         return verdict, (), ""
     names = " and ".join(t.effect.name for t in naming.fit.terms)
-    left: Verdict = "unknown"
+    passing = any(t.interval != ALWAYS for t in naming.fit.terms)
+    left: Verdict = "unknown" if structured or not passing else "none"
     if not borne_out(findings):
-        left = "unknown" if stands_out(findings) else "none"
+        left = left if stands_out(findings) else "none"
         objection = "blocks that were not fitted do not bear it out"
     elif passes_unseen(findings):
-        left = "unknown" if stands_out(findings) else "none"
+        left = left if stands_out(findings) else "none"
         objection = "only for a part of the record, where nothing stands out"
     elif made_up(findings, comparison):
         objection = "the data do not show the one without the other"
@@ -270,7 +277,10 @@ def diagnose(
         "named", "ambiguous"
     } else ()  # fmt: skip
     report("proving")(1.0)
-    verdict, findings, objection = _upheld(verdict, findings, naming, comparison, baseline.station)
+    structured = located(naming, bank, comparison, baseline).is_structure
+    verdict, findings, objection = _upheld(
+        verdict, findings, naming, comparison, baseline.station, structured
+    )
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)

@@ -158,7 +158,8 @@ def form_signatures(
 
     The change that the effect makes in the simulated signals may be larger or smaller than it
     should be in parts of the wind's range (speed, direction) and of the frequencies, and in each
-    statistic. Time is left out: an effect that comes and goes is another finding.
+    statistic; its eddies also in parts of the record, for it may grow. In the series time is left
+    out: an effect that comes and goes is another finding.
 
     Args:
         comparison: The recording.
@@ -204,20 +205,27 @@ def form_signatures(
                 len(comparison.channels) + k,
                 np.where(np.arange(shift.size) == j, STATISTIC_FORM_ERROR * shift, 0.0),
             )
-        risen = corrected.activity(name) - without.activity(name)
-        for band, deviation in enumerate(t.activity_deviation):
-            inside = np.arange(risen.size) // without.counted.size == band
-            whitened = np.where(inside, risen / deviation, 0.0)
-            add(2 * len(comparison.channels) + k, STATISTIC_FORM_ERROR * whitened)
+        place = 2 * len(comparison.channels) + k
+        risen = corrected.levels[name] - without.levels[name]
+        for weight in _thirds(np.linspace(0.0, 1.0, without.counted.size)):
+            grown = activity.contrasts(weight * risen, without.counted)
+            whitened = grown / t.activity_deviation[:, None]
+            for band in range(activity.BANDS):
+                only = np.where(np.arange(activity.BANDS)[:, None] == band, whitened, 0.0)
+                add(place, STATISTIC_FORM_ERROR * only.ravel())
     return np.array(rows) if rows else np.zeros((0, int(starts[-1])))
+
+
+def _thirds(rank: FloatArray) -> list[FloatArray]:
+    """Smooth weights over the low, the middle and the high of ranks from 0 to 1."""
+    return [np.clip(1.0 - np.abs(3.0 * rank - middle), 0.0, 1.0) for middle in (0.0, 1.5, 3.0)]
 
 
 def _wind_parts(comparison: Comparison) -> list[FloatArray]:
     """Smooth weights over the wind's speed and direction, shape (n,) each."""
     rank = np.argsort(np.argsort(comparison.speed)) / max(comparison.grid.n - 1, 1)
-    thirds = [np.clip(1.0 - np.abs(3.0 * rank - middle), 0.0, 1.0) for middle in (0.0, 1.5, 3.0)]
     heading = comparison.wind_from
-    return [*thirds, np.cos(heading), np.sin(heading), np.cos(2.0 * heading),
+    return [*_thirds(rank), np.cos(heading), np.sin(heading), np.cos(2.0 * heading),
             np.sin(2.0 * heading)]  # fmt: skip
 
 
@@ -225,6 +233,28 @@ def in_series(comparison: Comparison, whitened: FloatArray) -> FloatArray:
     """Noise-whitened differences (or rows of them) with those of the statistics left out."""
     series = comparison.coefficients * len(comparison.channels)
     return np.asarray(np.where(np.arange(whitened.shape[-1]) < series, whitened, 0.0))
+
+
+def shared_liveliness(
+    comparison: Comparison, trust: Mapping[str, Trust], liveliness: float
+) -> FloatArray:
+    """How all instruments' eddies may be livelier or calmer than the reference's for a while.
+
+    Args:
+        comparison: The recording.
+        trust: Noise of each channel.
+        liveliness: Standard deviation of the slowest such change.
+
+    Returns:
+        Noise-whitened, each of one standard deviation, shape (k, m).
+    """
+    deviations = np.concatenate([trust[c.name].activity_deviation for c in comparison.channels])
+    rows = [
+        (wave / deviations[:, None]).ravel()
+        for wave in activity.waves(comparison.measured.counted, liveliness)
+    ]
+    series_and_statistics = comparison.channel_of_each.size - rows[0].size
+    return np.pad(np.array(rows), ((0, 0), (series_and_statistics, 0)))
 
 
 def unstanding(comparison: Comparison, trust: Mapping[str, Trust]) -> Whitener:
