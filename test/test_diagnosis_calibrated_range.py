@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline
+from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline, default_channel
 from wind_sensors.diagnosis.calibrated_range import (
     is_calm,
     is_too_calm,
@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.diagnosis.learning import default_baseline, learn
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, channels_of
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation.run import simulate
@@ -78,3 +79,16 @@ def test_a_day_is_calm_if_a_fifth_of_it_lies_below_calibrations() -> None:
     lulls = np.where(np.arange(windy.size) < 0.3 * windy.size, 3.0, windy)
     assert not is_calm(replace(comparison, speed=windy))
     assert is_calm(replace(comparison, speed=lulls))
+
+
+def test_in_a_calm_spectra_may_depart_by_more_and_nothing_else() -> None:
+    for channel in channels_of(station()):
+        known = default_channel(channel)
+        calm, fresh, stormy = (known.statistics_deviation_in(speed) for speed in (2.5, 5.0, 15.0))
+        bands = len(NORMALISED_BANDS) - 1
+        usual = known.statistics_deviation
+        added = np.sqrt(np.maximum(calm**2 - usual**2, 0.0))
+        assert added[:bands] == pytest.approx(0.5)
+        assert np.sqrt(fresh**2 - usual**2)[:bands] == pytest.approx(0.125)
+        assert stormy == pytest.approx(usual, rel=0.01)
+        assert np.array_equal(calm[bands:], usual[bands:])

@@ -51,6 +51,12 @@ departs by far less from what its station usually shows than any station does fr
 """
 
 
+_CALM_SPECTRUM = 0.5
+_CALM = 2.5
+"""In a wind of the second [m/s] spectra depart by the first more: beside eddies that are weak and
+slow the reference's own noise counts. It fades with the eddies' power: with the speed squared."""
+
+
 def station_deviation(channel: Channel) -> FloatArray:
     """Standard deviations of a channel's statistics from the simulation of any station."""
     bands = np.full(_BANDS, _STATION_SPECTRUM)
@@ -67,6 +73,17 @@ def daily_deviation(channel: Channel) -> FloatArray:
         erratic, steps = np.full(ERRATIC, _DAILY_ERRATIC), np.full(STEPS, _DAILY_STEPS)
         return np.concatenate((bands, _DAILY_STILLNESS, erratic, steps))
     return np.concatenate((bands, _DAILY_INTERVALS))
+
+
+def calm_deviation(statistics: int, mean_speed: float) -> FloatArray:
+    """What a calm adds to the scatter of a channel's statistics, shape (statistics,).
+
+    Args:
+        statistics: Number of them.
+        mean_speed: Of the record [m/s].
+    """
+    added = _CALM_SPECTRUM * (_CALM / mean_speed) ** 2
+    return np.where(np.arange(statistics) < _BANDS, added, 0.0)
 
 
 @dataclass(frozen=True)
@@ -101,6 +118,11 @@ class ChannelBaseline:
             sampling: Variance of as many independent coefficients, shape (bands,).
         """
         return np.asarray(np.sqrt(self.activity_excess * sampling))
+
+    def statistics_deviation_in(self, mean_speed: float) -> FloatArray:
+        """Deviation of the statistics in a wind of some mean speed [m/s]."""
+        added = calm_deviation(self.statistics_deviation.size, mean_speed)
+        return np.hypot(self.statistics_deviation, added)
 
     def exponent_at(self, frequency: FloatArray) -> FloatArray:
         """Exponents at other frequencies [Hz]."""

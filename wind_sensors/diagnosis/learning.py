@@ -13,6 +13,7 @@ from wind_sensors.diagnosis.baseline import (
     FREQUENCIES,
     Baseline,
     ChannelBaseline,
+    calm_deviation,
     daily_deviation,
     default_channel,
 )
@@ -145,12 +146,13 @@ def _statistics(
             for c in comparisons
         ]
     )
-    seen = np.isfinite(rows)
-    count = seen.sum(axis=0)
-    filled = np.where(seen, rows, 0.0)
+    calm = np.array([calm_deviation(prior.size, float(np.mean(c.speed))) for c in comparisons])
+    weight = np.where(np.isfinite(rows), prior**2 / (prior**2 + calm**2), 0.0)
+    count = weight.sum(axis=0)
+    filled = np.nan_to_num(rows)
     # A mean of few recordings is itself uncertain, which the deviation has to carry.
-    mean = filled.sum(axis=0) / (count + 0.25)
-    squares = np.where(seen, (rows - mean) ** 2, 0.0).sum(axis=0)
+    mean = (weight * filled).sum(axis=0) / (count + 0.25)
+    squares = (weight * (filled - mean) ** 2).sum(axis=0)
     variance = (squares + _PRIOR_STRENGTH * prior**2) / (count + _PRIOR_STRENGTH - 1.0)
     variance = variance * (1.0 + 1.0 / (count + 0.25))
     return mean, np.sqrt(variance)

@@ -70,15 +70,14 @@ def _trust(
     variance = spectra.noise_variance(
         residual, known.low_ratio_at(coherence.frequency), low_end
     )
+    mean_speed = float(np.mean(comparison.speed))
     return Trust(
         slope=slope,
         deviation=np.sqrt(variance + SMALLEST_DEVIATION**2),
         statistics_mean=known.statistics_mean,
-        statistics_deviation=known.statistics_deviation,
+        statistics_deviation=known.statistics_deviation_in(mean_speed),
         activity_deviation=known.activity_deviation(
-            activity.sampling_variance(
-                channel, float(np.mean(comparison.speed)), comparison.grid
-            )
+            activity.sampling_variance(channel, mean_speed, comparison.grid)
         ),
     )
 

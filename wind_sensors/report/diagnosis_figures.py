@@ -152,12 +152,14 @@ def statistics_figure(
         None if nothing departs from healthy days.
     """
 
+    deviation = known.statistics_deviation_in(float(np.mean(comparison.speed)))
+
     def departures(expected: Simulated) -> FloatArray:
         away = comparison.measured.statistics[channel.name] - expected.statistics[channel.name]
-        return np.asarray((away - known.statistics_mean) / known.statistics_deviation)
+        return np.asarray((away - known.statistics_mean) / deviation)
 
     before = departures(simulated)
-    shown = np.flatnonzero(np.isfinite(before) & np.isfinite(known.statistics_deviation))
+    shown = np.flatnonzero(np.isfinite(before) & np.isfinite(deviation))
     if not np.any(np.abs(before[shown]) > _TELLING):
         return None
     after = before if corrected is None else departures(corrected)
