@@ -110,3 +110,14 @@ def test_a_rival_with_more_parameters_has_to_fit_as_well(
     rival = replace(drifted.fit, terms=(Term(catalogue()[effect], "cup", values),), active=active)
     found = equal_explanations(replace(drifted, alternatives=(Alternative(rival, behind),)))
     assert [a.fit.terms[0].effect.name for _, a in found] == ([effect] if equal else [])
+
+
+@pytest.mark.parametrize(("gain", "equal"), [(400.0, True), (30.0, True), (26.0, False)])
+def test_what_passes_and_would_not_be_named_is_no_rival(
+    searcher: Searcher, gain: float, equal: bool
+) -> None:
+    drifted = named(searcher, drift())
+    terms = (Term(catalogue()["calibration_offset"], "cup", {"offset": 0.2}, (0.0, 200.0)),)
+    alternatives = (Alternative(replace(drifted.fit, terms=terms), 4.0),)
+    found = equal_explanations(replace(drifted, gain=gain, alternatives=alternatives))
+    assert bool(found) is equal

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.acceptance import passing_gain
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import EQUAL_SHARE, Alternative, Naming
@@ -125,7 +126,8 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
 
     One with more parameters could follow what the simulation is inexact about: if it is behind all
     the same, only the likelihood speaks for it. What contains an effect and fits no better adds
-    something to it that the recording does not show.
+    something to it that the recording does not show. What passes and brings too little to be named
+    by itself is no rival either.
     """
     own = [t.key for t in naming.fit.terms]
     share = EQUAL_SHARE if len(own) == 1 else 0.0
@@ -140,6 +142,8 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
             continue
         newest, rival = alternative.fit.terms[-1], naming.fit.terms[missing[0]]
         if rival.effect.name in newest.effect.contains and alternative.behind > 0.0:
+            continue
+        if len(own) == 1 and naming.gain - alternative.behind < passing_gain(newest):
             continue
         limit = likely if alternative.fit.active > naming.fit.active else inexact
         if alternative.behind < limit and _alike(naming, alternative):
