@@ -14,7 +14,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import STATISTICS, Channel
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
-from wind_sensors.report.diagnosis_figures import statistics_figure
+from wind_sensors.report.diagnosis_figures import activity_figure, statistics_figure
 from wind_sensors.report.diagnosis_page import page
 
 
@@ -70,6 +70,28 @@ def test_what_departs_too_far_to_be_drawn_is_told_at_the_edge(far: float) -> Non
 
     moved = told_of_steps(replace(known, statistics_mean=mean))
     assert moved - told_of_steps(known) == pytest.approx(far, abs=2.0)
+
+
+def test_eddies_that_grow_calm_inside_the_record_are_drawn() -> None:
+    found = stepped()
+    cup = of(found, "rotor_rate")
+    known = found.baseline.channels[cup.name]
+    simulated = found.simulated
+    assert activity_figure(found.comparison, known, simulated, None, cup) is None
+    levels = simulated.levels[cup.name].copy()
+    half = levels.shape[1] // 2
+    levels[1, half:] += np.log(4.0)
+    livelier = replace(simulated, levels={**simulated.levels, cup.name: levels})
+    made = activity_figure(found.comparison, known, livelier, simulated, cup)
+    assert made is not None
+    (axes,) = made.axes
+    drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in axes.get_lines()}
+    before, after = drawn["before"], drawn["with it"]
+    # A quarter of the power than before, beside the mean over the record: half to twice as much.
+    assert np.log(before[:half]).mean() == pytest.approx(np.log(2.0), abs=0.2)
+    assert np.log(before[half:]).mean() == pytest.approx(-np.log(2.0), abs=0.2)
+    assert np.abs(np.log(after)).mean() < 0.3
+    assert "eddies" in axes.get_title(loc="left")
 
 
 def test_the_page_tells_name_size_and_what_is_left() -> None:

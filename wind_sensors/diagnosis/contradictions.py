@@ -36,10 +36,11 @@ LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
 
 UNEVEN = 12.0
-UNEVEN_SHARE = 0.005
+UNEVEN_SHARE = 0.015
 """An effect has one size, whether its signal is lively or quiet: another one in lively moments must
-not drop the cost by more than this, or than this share of the gain. What refuses jumps, or sticks
-and slips in its own way, is taken for a filter or for friction otherwise."""
+not drop the cost by more than this, or than this share of the gain (a form that errs by a tenth
+brings a hundredth). What refuses jumps, or sticks and slips in its own way, is taken for a filter
+or for friction otherwise."""
 
 DISCORD = 20.0
 DISCORD_SHARE = 0.02

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import ChannelBaseline
 from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
 from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STATISTICS, Channel
@@ -27,6 +27,11 @@ _USUAL = 2.0
 
 _TELLING = 4.0
 """Statistics are drawn if one of them departs further than this."""
+
+_LEVEL_PARTS = 4
+_TELLING_LEVELS = 3.5
+"""Levels of quick eddies are drawn if the mean over so many of them departs further than this, in
+its own standard deviations."""
 
 _FURTHEST = 40.0
 """Beyond so many standard deviations a point is drawn at the edge, with its number."""
@@ -190,6 +195,70 @@ def statistics_figure(
         axes.invert_yaxis()
         axes.set_title(f"Raw signals, {channel_words(channel.name)}")
         axes.set_xlabel("recorded minus simulated, in standard deviations of healthy days")
+        if corrected is not None:
+            axes.legend(loc="best", ncols=2)
+    return made
+
+
+def activity_figure(
+    comparison: Comparison,
+    known: ChannelBaseline,
+    simulated: Simulated,
+    corrected: Simulated | None,
+    channel: Channel,
+) -> Figure | None:
+    """Power of quick eddies over the simulation's, from half-minute to half-minute.
+
+    What begins inside a record and damps or hastens a signal moves no mean: it shows here.
+
+    Args:
+        comparison: The recording.
+        known: What it does on healthy days.
+        simulated: Simulation of the station as it is described.
+        corrected: With the named physics; None: nothing is named.
+        channel: What is shown, in the band of eddies that departs most.
+
+    Returns:
+        None if no band departs from healthy days for minutes.
+    """
+    counted = comparison.measured.counted
+    mean_speed = float(np.mean(comparison.speed))
+    deviation = known.activity_deviation(
+        activity.sampling_variance(channel, mean_speed, comparison.grid)
+    )
+
+    def contrasts(expected: Simulated) -> FloatArray:
+        away = comparison.measured.levels[channel.name] - expected.levels[channel.name]
+        return activity.contrasts(away, counted)
+
+    before = contrasts(simulated)
+    together = before[:, : before.shape[1] // _LEVEL_PARTS * _LEVEL_PARTS]
+    parts = together.reshape(activity.BANDS, -1, _LEVEL_PARTS).mean(axis=2)
+    if parts.shape[1] == 0:
+        return None
+    farthest = np.abs(parts).max(axis=1) / deviation * np.sqrt(_LEVEL_PARTS)
+    band = int(np.argmax(farthest))
+    if farthest[band] < _TELLING_LEVELS:
+        return None
+    at = (np.arange(counted.size) + 0.5) * activity.SEGMENT
+    with style.house():
+        made = Figure(figsize=(9.0, 2.6), layout="constrained")
+        axes = made.add_subplot()
+        usual = np.exp(_USUAL * float(deviation[band]))
+        axes.axhspan(1.0 / usual, usual, color=style.GRID, zorder=0)
+        axes.axhline(1.0, color=style.MUTED, linewidth=0.8)
+        drawn = [(before, style.RAW, "before")]
+        if corrected is not None:
+            drawn.append((contrasts(corrected), style.CORRECTED, "with it"))
+        for values, colour, label in drawn:
+            ratio = np.exp(values[band][counted])
+            axes.plot(at[counted], ratio, "o-", color=colour, markersize=4.0, label=label)
+        axes.set_yscale("log", base=2)
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.set_xlabel("time in s (means over half a minute)")
+        axes.set_ylabel("recorded / simulated power,\nmean of the record: 1")
+        words = eddies(channel, activity.EDGES[band : band + 2])
+        axes.set_title(f"{words[0].upper()}{words[1:]}, {channel_words(channel.name)}")
         if corrected is not None:
             axes.legend(loc="best", ncols=2)
     return made

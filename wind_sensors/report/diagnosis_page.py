@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.proof import Proof
 from wind_sensors.diagnosis.regions import OF_POWER, Found
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.diagnosis_figures import (
+    activity_figure,
     as_svg,
     channel_words,
     residual_figure,
@@ -273,9 +274,10 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
             continue
         figures.append(residual_figure(comparison, simulated, corrected, channel))
         known = diagnosis.baseline.channels[channel.name]
-        raw = statistics_figure(comparison, known, simulated, corrected, channel)
-        if raw is not None:
-            figures.append(raw)
+        for drawn in (activity_figure, statistics_figure):
+            raw = drawn(comparison, known, simulated, corrected, channel)
+            if raw is not None:
+                figures.append(raw)
     healthy = ", ".join(diagnosis.baseline.recordings) or "none"
     body = [
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
