@@ -367,7 +367,9 @@ def test_a_fit_with_derivatives_carried_along_ends_where_an_exact_one_does() -> 
     best = minimize(
         cost, [5.0, -3.0, 0.6], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-2}
     )
-    assert found.cost == pytest.approx(best.fun, abs=0.5)
+    # Shares of small turns are counts of readings: steps of a thousandth of a parameter move the
+    # cost by some tenths. An interval of 95 % spans 3.8.
+    assert found.cost == pytest.approx(best.fun, abs=1.0)
     np.testing.assert_allclose(
         [found.terms[0].values["sine"], found.terms[0].values["cosine"],
          found.terms[1].values["time_constant"]],
