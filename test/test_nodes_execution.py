@@ -21,6 +21,10 @@ ESTIMATORS = ("cup_vane_node", "propeller_vane_node", "propeller_array_node", "b
 
 def _start(node: str, tmp_path: Path, *arguments: str) -> subprocess.Popen[str]:
     code = f"import sys; from wind_sensors.nodes.{node} import main; sys.exit(main(sys.argv[1:]))"
+    return _run(code, tmp_path, *arguments)
+
+
+def _run(code: str, tmp_path: Path, *arguments: str) -> subprocess.Popen[str]:
     environment = os.environ | {
         "ROS_LOG_DIR": str(tmp_path),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -56,6 +60,30 @@ def test_every_way_to_stop_it_ends_with_status_zero(node: str, tmp_path: Path) -
         _, errors = process.communicate(timeout=30)
         assert process.returncode == 0, f"{case}: {errors}"
         assert "Traceback" not in errors
+
+
+_INTERRUPTED_CLASS = """
+import os, signal, sys
+from wind_sensors.nodes.execution import run
+
+class Interrupting:
+    def __set_name__(self, owner, name):
+        os.kill(os.getpid(), signal.SIGINT)
+
+def build():
+    class Holder:
+        part = Interrupting()
+    raise SystemExit("the signal was lost")
+
+sys.exit(run(build, []))
+"""
+
+
+def test_a_signal_while_a_class_is_being_made_ends_with_status_zero(tmp_path: Path) -> None:
+    process = _run(_INTERRUPTED_CLASS, tmp_path)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
 
 
 @pytest.mark.parametrize("node", ESTIMATORS)

@@ -46,6 +46,7 @@ class _StopSignals:
 
     def __init__(self) -> None:
         self.phase = _Phase.LOADING
+        self.stopped = False
         self._installed = False
         self._usual = sys.unraisablehook
 
@@ -57,6 +58,7 @@ class _StopSignals:
             if sys.unraisablehook is not _unraisable:
                 self._usual = sys.unraisablehook
                 sys.unraisablehook = _unraisable
+            self.stopped = False
             self._installed = True
 
     def report_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
@@ -86,6 +88,7 @@ class _StopSignals:
             # Nothing has been opened yet, so there is nothing to close.
             os._exit(0)
         if self.phase is _Phase.BUILDING:
+            self.stopped = True
             raise _Stopped
         # While running, rclpy has shut its context down and the spinning loop sees that.
 
@@ -172,7 +175,9 @@ def run(
     except ParameterException as error:
         raise UserError(f"{error}.", "parameters") from error
     except Exception as error:
-        if rclpy.ok() or not _is_consequence_of_shutdown(error):
+        # What is raised while a class is being made, Python 3.11 hands on as an error of its own.
+        interrupted = _stop_signals.stopped
+        if not interrupted and (rclpy.ok() or not _is_consequence_of_shutdown(error)):
             raise
     finally:
         _stop_signals.phase = _Phase.RUNNING
