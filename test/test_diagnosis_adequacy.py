@@ -210,25 +210,28 @@ LATE = ("timestamp_latency", "vane")
 
 
 @pytest.mark.parametrize(
-    ("effects", "shares", "ps", "verdict"),
+    ("effects", "gains", "ps", "verdict"),
     [
-        ((OFFSET, ASYMMETRY), (0.6, 0.5), (0.002, 0.002), False),
-        ((OFFSET, ASYMMETRY), (1.0, 0.9), (0.002, 0.002), True),
-        ((OFFSET, LATE), (1.0, 0.9), (0.002, 0.002), False),
-        ((OFFSET, ASYMMETRY), (0.6, 0.3), (0.002, 0.4), True),
-        ((OFFSET, LATE), (0.4, 0.7), (0.002, 0.4), False),
-        ((OFFSET,), (1.0,), (0.4,), False),
+        ((OFFSET, ASYMMETRY), (60.0, 50.0), (0.002, 0.002), False),
+        ((OFFSET, ASYMMETRY), (100.0, 90.0), (0.002, 0.002), True),
+        ((OFFSET, LATE), (100.0, 90.0), (0.002, 0.002), False),
+        ((OFFSET, ASYMMETRY), (60.0, 30.0), (0.002, 0.4), True),
+        ((OFFSET, LATE), (40.0, 70.0), (0.002, 0.4), False),
+        ((OFFSET,), (100.0,), (0.4,), False),
     ],
 )
 def test_two_effects_must_stand_out_one_by_one(
     effects: tuple[tuple[str, str], ...],
-    shares: tuple[float, ...],
+    gains: tuple[float, ...],
     ps: tuple[float, ...],
     verdict: bool,
 ) -> None:
     comparison = prepare(recorded(STATION, 65))
-    found = tuple(_finding(*e, s, p) for e, s, p in zip(effects, shares, ps, strict=True))
-    assert made_up(found, comparison) is verdict
+    found = tuple(
+        replace(_finding(*e, g / 100.0, p), gain=g)
+        for e, g, p in zip(effects, gains, ps, strict=True)
+    )
+    assert made_up(found, comparison, 100.0) is verdict
 
 
 @pytest.mark.parametrize(
@@ -323,7 +326,7 @@ def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
     rival = replace(_finding(*ASYMMETRY, 0.9, 0.5), proof=None)
     found = (_finding(*OFFSET, 0.9, 0.002), rival)
-    assert not made_up(found, prepare(recorded(STATION, 65)))
+    assert not made_up(found, prepare(recorded(STATION, 65)), 100.0)
 
 
 def test_a_compass_shows_twice_a_turn_only_where_the_carrier_turns() -> None:

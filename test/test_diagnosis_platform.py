@@ -70,13 +70,14 @@ def test_an_effect_adds_to_what_a_station_already_states() -> None:
         stated,
         catalogue()["rotor_downwash"],
         "platform",
-        {"induced_velocity": 0.5, "wake_skew": 0.2},
+        {"induced_velocity": 0.5, "wake_skew": 0.2, "forward": 0.1, "leftward": 0.0},
     )
     assert more.platform is not None
     found = more.platform.downwash
     assert (found.thrust, found.disc_area, found.sensor_share) == (20.0, 0.5, 0.2)
     assert found.induced_velocity == 0.5
     assert found.wake_skew == pytest.approx(0.3)
+    assert found.spread == (0.1, 0.0)
 
 
 def test_a_log_that_dies_is_found_with_its_end() -> None:

@@ -318,6 +318,14 @@ def test_downwash_obeys_momentum_theory(hover, airspeed):
     assert added[0] == pytest.approx(-0.5 * induced * airspeed / hover)
 
 
+def test_a_jet_beside_its_rotor_blows_outwards_with_the_platform():
+    apparent = np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]])
+    added = rotor_downwash(Downwash(induced_velocity=2.0, spread=(0.3, -0.1)), apparent)
+    np.testing.assert_allclose(added[:, 0], -0.3 * added[:, 2])
+    np.testing.assert_allclose(added[:, 1], 0.1 * added[:, 2])
+    assert added[0, 2] == pytest.approx(-2.0)
+
+
 @given(st.floats(1.0, 100.0), st.floats(0.05, 2.0), st.floats(0.4, 0.9), st.floats(0.05, 1.0))
 def test_thrust_and_the_power_it_takes_give_the_same_inflow(thrust, area, merit, share):
     by_thrust = hover_induced_velocity(

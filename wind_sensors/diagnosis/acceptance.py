@@ -251,9 +251,10 @@ def is_plausible(term: Term) -> bool:
         return False
     for parameter in term.effect.parameters:
         margin = 0.02 * (parameter.high - parameter.low)
-        shapes = parameter.healthy is None and not parameter.wraps and parameter.low > 0.0
-        if shapes and term.values[parameter.name] > parameter.high - margin:
-            # A wake as wide as half the horizon is none.
+        shapes = parameter.healthy is None and not parameter.wraps
+        fitted = shapes and parameter.value_from == "fit"
+        if fitted and term.values[parameter.name] > parameter.high - margin:
+            # A wake as wide as half the horizon is none, nor does a flow past a mast bend more.
             return False
         if not parameter.graded or parameter.healthy is None or parameter.minimum <= 0.0:
             continue

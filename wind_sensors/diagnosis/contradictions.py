@@ -22,8 +22,8 @@ LEAST_CHANGE = 30.0
 does, in squares, if that is more than the second."""
 
 PARTS = 8
-VARIES = 18.0
-VARIES_SHARE = 0.02
+VARIES = 30.0
+VARIES_SHARE = 0.03
 """What always holds, in a form that is certain, is the same in every part, half and quarter of the
 record: a size of its own in one of them must not drop the cost by more than this, or than this
 share of the gain."""
@@ -81,7 +81,8 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
 def varies(naming: Naming, station: Station) -> bool:
     """Whether an effect that should hold throughout has another size in a part of the record.
 
-    Only a form that is certain can be held to that: others depend on the wind in ways of their own.
+    Only a form that is certain can be held to that: others depend on the wind in ways of their own,
+    and what they leave on the same signals is nothing against it.
 
     Args:
         naming: The explanation.
@@ -91,8 +92,15 @@ def varies(naming: Naming, station: Station) -> bool:
     comparison = null.comparison
     left = null.of(naming.fit.simulated)
     share = VARIES_SHARE * naming.gain
+    inexact = {
+        name
+        for term in naming.fit.terms
+        if not term.effect.exact
+        for name in comparison.affected(comparison.station, term.instrument)
+    }
     for term in naming.fit.terms:
-        if term.effect.noisy or not term.effect.exact:
+        alike = inexact & set(comparison.affected(comparison.station, term.instrument))
+        if term.effect.noisy or not term.effect.exact or alike:
             continue
         without = _without(naming, station, term)
         if without is None:

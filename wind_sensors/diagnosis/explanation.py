@@ -26,8 +26,8 @@ EQUAL_SHARE = 0.03
 exact enough to tell them apart."""
 
 CLEARLY_BETTER = 12.0
-"""Drop of the penalised cost at which two effects take the place of another explanation, and which
-an explanation must not miss to compete with another."""
+"""Drop of the penalised cost at which two effects take the place of another explanation, which an
+explanation must not miss to compete with another, and which a beginning or an end must bring."""
 
 
 def parameter_cost(terms: Sequence[Term], parameters: int) -> float:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
 from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -399,15 +400,25 @@ def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> Flo
 
 def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
     """Bounds of all parameters; those that are told or not to be fitted have no room."""
-    parameters = [p for _, p in _parameters(terms)]
-    low = np.array([p.low for p in parameters])
-    high = np.array([p.high for p in parameters])
+    placed = _parameters(terms)
+    low = np.array([p.low for _, p in placed])
+    high = np.array([p.high for _, p in placed])
     drive = whitener.comparison.drive
-    swing = 0.0 if drive.temperature is None else float(np.ptp(drive.temperature))
-    for k, parameter in enumerate(parameters):
+    swings = [_swing(drive, term.interval) for term in terms]
+    for k, (owner, parameter) in enumerate(placed):
         tied = parameter.free is not None and not parameter.free(drive)
-        if (tied or parameter.swing > swing) and parameter.healthy is not None:
+        if (tied or parameter.swing > swings[owner]) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
         elif parameter.value_from != "fit":
             low[k] = high[k] = values_of(terms)[k]
     return low, high
+
+
+def _swing(drive: Drive, interval: Interval) -> float:
+    """Range of the air's temperature [K] while an effect holds."""
+    if drive.temperature is None:
+        return 0.0
+    since = drive.elapsed + drive.dt * np.arange(len(drive))
+    begin, end = interval
+    while_held = drive.temperature[(since >= begin) & (since <= (np.inf if end is None else end))]
+    return float(np.ptp(while_held)) if while_held.size else 0.0

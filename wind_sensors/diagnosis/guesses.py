@@ -49,8 +49,16 @@ LEAST_HELD = 0.02
 """Rate [m/s] below which a rotor counts as standing, and share of the record for which a bearing
 that sticks has to hold it."""
 
-BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift", "bearing_friction"})
+JET = 2.5
+JET_SPREADS = ((0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25))
+"""Induced velocity [m/s] of rotors and shares of it that blow forward and to the left, to begin
+with: a small jet from above moves nothing that turns about an upright axis."""
+
+BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift", "bearing_friction", "rotor_downwash"})
 """Effects that are tried whether or not the screening sees them."""
+
+BLIND_IN_PARTS = BLIND_EFFECTS - {"clock_drift"}
+"""The same of those that may hold for some minutes; a clock that drifted then stays wrong."""
 
 DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
@@ -93,6 +101,15 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
         for towards in np.arange(8) * np.pi / 4.0
     ]
     out[leans[0].key] = leans
+    if station.platform is not None:
+        jets = [
+            _term(
+                "rotor_downwash", PLATFORM,
+                induced_velocity=JET, wake_skew=0.0, forward=forward, leftward=leftward,
+            )
+            for forward, leftward in JET_SPREADS
+        ]  # fmt: skip
+        out[jets[0].key] = jets
     clocks = [channel.instrument for channel in comparison.channels]
     for instrument in [*clocks, STATION]:
         drifts = [_term("clock_drift", instrument, drift=drift) for drift in DRIFTS]

@@ -21,7 +21,7 @@ EVENT = 3
 """So many in a row may hold a single event; one, of an effect that passes anyway."""
 
 STEADY_TIME = 15.0
-STEADY_P = 0.02
+STEADY_P = 0.05
 """What begins or ends inside the record gains again and again while it holds: the mean gain of
 parts of so many seconds differs from nought by Student's test at this level. A gust that the
 reference missed brings as much, at once."""

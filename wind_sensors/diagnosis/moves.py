@@ -153,6 +153,7 @@ def merged(
     whitener: Whitener,
     current: Fit,
     singles: Sequence[Sequence[Term]],
+    excluded: frozenset[str],
 ) -> Fit:
     """One effect in the place of several, where it does nearly as well.
 
@@ -164,8 +165,9 @@ def merged(
         whitener: The null.
         current: The explanation by several effects.
         singles: Single effects that did well in the beginning.
+        excluded: Names of effects that are not to be used.
     """
-    if any(term.is_told for term in current.terms):
+    if len(current.terms) < 2 or any(term.is_told for term in current.terms):
         return current
     instruments = [t.instrument for t in current.terms]
     crowded = {name for name in instruments if instruments.count(name) > 1}
@@ -175,7 +177,7 @@ def merged(
     more = [
         (starts[0],)
         for starts in searcher.single_candidates(whitener, nothing.vector, MERGE_CANDIDATES)
-        if starts[0].key not in known
+        if starts[0].key not in known and starts[0].effect.name not in excluded
     ]
     intervals = {ALWAYS, *(t.interval for t in current.terms)}
     candidates: dict[tuple[tuple[str, str], object], list[Term]] = {
@@ -202,9 +204,19 @@ def merged(
 
 
 def swapped(
-    searcher: Searcher, whitener: Whitener, current: Fit
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    excluded: frozenset[str] = frozenset(),
 ) -> tuple[Fit, tuple[Alternative, ...]]:
-    """The explanation with single terms exchanged for better ones, and those that come close."""
+    """The explanation with single terms exchanged for better ones, and those that come close.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+        excluded: Names of effects that are not to be used.
+    """
     losers: list[Judged] = []
     leader = Judged(current, whitener, evidence(current, whitener))
     for k in range(len(current.terms)):
@@ -219,7 +231,9 @@ def swapped(
         candidates = [
             starts
             for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
-            if may_join(starts[0], others) and starts[0].key != current.terms[k].key
+            if may_join(starts[0], others)
+            and starts[0].key != current.terms[k].key
+            and starts[0].effect.name not in excluded
         ]
         rivals = [
             f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)

@@ -31,6 +31,7 @@ from wind_sensors.diagnosis.explanation import (
 )
 from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
+from wind_sensors.diagnosis.guesses import BLIND_IN_PARTS
 from wind_sensors.diagnosis.moves import looked_around, merged, pruned, simplified, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
 from wind_sensors.diagnosis.pairs import better_pair
@@ -202,7 +203,7 @@ def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -
     return any(
         other.fit.terms[-1].key == newest.key
         and other.fit.terms[-1].interval == ALWAYS
-        and other.evidence < one.evidence + ONSET_GAIN
+        and other.evidence < one.evidence + CLEARLY_BETTER
         for _, other in others
     )
 
@@ -226,7 +227,7 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
     always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
     (other,) = judged(searcher, [always], named)
-    allowed = -ONSET_GAIN if read else ONSET_GAIN
+    allowed = -ONSET_GAIN if read else CLEARLY_BETTER
     as_well = plausible(other.fit) and other.evidence < one.evidence + allowed
     return other if as_well else one
 
@@ -258,8 +259,35 @@ def _with_sharp_intervals(
     ]
     lasting = [r for r in ranked if not any(r is p for p in passing)]
     sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
-    fuller = [f for f in searcher.refit_all(null, _fuller(searcher, sharp)) if plausible(f)]
-    return sorted([*lasting, *sharp, *judged(searcher, fuller, named)], key=lambda r: r.evidence)
+    others = [*searcher.refit_all(null, _fuller(searcher, sharp))]
+    if sharp:
+        others += searcher.fit_all(null, named, _blind(searcher, sharp))
+    sound = judged(searcher, [f for f in others if plausible(f)], named)
+    return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
+
+
+def _blind(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
+    """Starting points, in the best of the intervals, of effects that the screening hardly sees.
+
+    Of those that act on the signals which the last effect there reaches.
+
+    Args:
+        searcher: The search.
+        passing: Explanations whose last effect begins or ends inside the record, best first.
+    """
+    *others, last = passing[0].fit.terms
+    reached = set(searcher.comparison.affected(searcher.station, last.instrument))
+    newest = [one.fit.terms[-1] for one in passing]
+    known = {term.key for term in newest if term.interval == last.interval}
+    found = []
+    for key, guesses in searcher.guesses.items():
+        touches = reached & set(searcher.comparison.affected(searcher.station, key[1]))
+        if key[0] not in BLIND_IN_PARTS or key in known or not touches:
+            continue
+        starts = [replace(g, interval=last.interval) for g in guesses]
+        if may_join(starts[0], others):
+            found.append(starts)
+    return found
 
 
 def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
@@ -385,9 +413,10 @@ def _greedy(
         current = seen_in(whitener, current)
     if len(current.terms) > 1:
         known = [alone, *((term,) for a in alternatives for term in a.fit.terms)]
-        current = merged(searcher, whitener, pruned(searcher, whitener, current), known)
+        current = pruned(searcher, whitener, current)
+        current = merged(searcher, whitener, current, known, excluded)
         if len(current.terms) > 1:
-            current, alternatives = swapped(searcher, whitener, current)
+            current, alternatives = swapped(searcher, whitener, current, excluded)
         else:
             alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
     if progress:

@@ -16,8 +16,8 @@ LEAST_REMOVED = 0.7
 """Share of the excess misfit that held-out blocks must lose to what is named."""
 
 MOST_SHARED = 1.5
-"""Largest sum of the shares of the misfit that two effects on the same signals explain, each in the
-other's presence."""
+"""Largest sum of what two effects on the same signals bring, each in the other's presence, over
+what they bring together."""
 
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
@@ -32,17 +32,22 @@ only, and so need not gain all the time."""
 PASSING_P = 0.02
 """It stands out below this probability: of the many intervals that were tried one fits a gust."""
 
-SURE_GAIN = 100.0
+SURE_GAIN = 50.0
 SURE_SIZE = 3.0
 """What brings so much and is so many of the smallest sizes worth reporting is there, whatever the
 intervals of its parameters say."""
 
 
-def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
+def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
     One of them stands out nowhere, or each has to make good what the other does to the same
     signals.
+
+    Args:
+        findings: What is said.
+        comparison: The recording.
+        gain: Drop of the cost by all of it.
     """
     own = [f for f in findings if f.proof is not None]
     if len(own) < 2:
@@ -51,7 +56,7 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison) -> bool:
         return True
     reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
     together = bool(set.intersection(*reached))
-    return together and sum(f.share for f in own) > MOST_SHARED
+    return together and sum(f.gain for f in own) > MOST_SHARED * gain
 
 
 def passes_unseen(findings: tuple[Finding, ...]) -> bool:

@@ -200,7 +200,7 @@ def _upheld(
     elif passes_unseen(findings):
         left = left if stands_out(findings) else "none"
         objection = "only for a part of the record, where nothing stands out"
-    elif made_up(findings, comparison):
+    elif made_up(findings, comparison, naming.gain):
         objection = "the data do not show the one without the other"
     elif undo_each_other(naming, station):
         objection = "each would have to undo what the other does"

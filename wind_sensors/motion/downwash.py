@@ -50,7 +50,8 @@ def rotor_downwash(downwash: Downwash, apparent: FloatArray) -> FloatArray:
 
     Glauert's momentum theory in forward flight: the induced velocity v solves
     v sqrt(V^2 + v^2) = v_h^2 with V the airspeed across the rotor axis and v_h the value at hover.
-    It points down; a skewed wake leans with the flow by `wake_skew` times V/v_h.
+    It points down; a skewed wake leans with the flow by `wake_skew` times V/v_h. Off the rotors'
+    axes the jet also blows outwards, along the platform's x and y by the shares in `spread`.
 
     Args:
         downwash: Its parameters.
@@ -67,7 +68,8 @@ def rotor_downwash(downwash: Downwash, apparent: FloatArray) -> FloatArray:
     half = 0.5 * squared / hover**2
     induced = hover * np.sqrt(np.sqrt(np.square(half) + 1.0) - half)
     lean = downwash.wake_skew * induced / abs(hover)
-    added[:, 0] = lean * apparent[:, 0]
-    added[:, 1] = lean * apparent[:, 1]
+    forward, leftward = downwash.spread
+    added[:, 0] = lean * apparent[:, 0] + forward * induced
+    added[:, 1] = lean * apparent[:, 1] + leftward * induced
     added[:, 2] = -induced
     return added

@@ -349,6 +349,8 @@ class Downwash(Entry):
     """Vertical induced velocity at hover, at the sensor [m/s], positive downwards."""
     wake_skew: float = 0.0
     """Horizontal share of it per unit of airspeed over induced velocity."""
+    spread: tuple[float, float] = (0.0, 0.0)
+    """Share of it that blows forward and to the left: off the rotors' axes the jet spreads."""
     thrust: NonNegative = 0.0
     """Of all rotors at hover [N], about the weight: v_h = sqrt(T / (2 rho A))."""
     hover_power: NonNegative = 0.0

@@ -34,8 +34,8 @@ class Parameter:
         step: Size of a finite difference; 0: a tenth of `minimum`, or of the bounds' distance.
         wraps: Period of an angle, 0 for none.
         free: Whether what drives the recording lets it be fitted; None: always.
-        swing: Smallest change of the air's temperature within the record [K] that the parameter
-            needs; with less it keeps its healthy value.
+        swing: Smallest change of the air's temperature, while the effect holds, that the parameter
+            needs [K]; with less it keeps its healthy value.
         value_from: The `fit`; the `signals`, which tell it better than a fit can; or several
             `forms` of the effect, each of which is tried as it is.
     """

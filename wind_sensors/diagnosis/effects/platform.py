@@ -285,11 +285,13 @@ FRAME_ERROR = Effect(
 def _downwash(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Platform)
     stated = entry.downwash
+    forward, leftward = stated.spread
     return {
         "downwash": stated.model_copy(
             update={
                 "induced_velocity": stated.induced_velocity + values["induced_velocity"],
                 "wake_skew": stated.wake_skew + values["wake_skew"],
+                "spread": (forward + values["forward"], leftward + values["leftward"]),
             }
         )
     }
@@ -299,19 +301,23 @@ ROTOR_DOWNWASH = Effect(
     name="rotor_downwash",
     meaning="The inflow of the carrier's own rotors reaches the sensor.",
     entrance="wind",
-    equation="w' = w - v_i; u' = u + skew * v_i / |v_h| * u; v_i sqrt(u^2 + v_i^2) = v_h^2",
+    equation="w' = w - v_i; u' = u + v_i (skew u / |v_h| + spread); "
+    "v_i sqrt(u^2 + v_i^2) = v_h^2",
     source="Glauert's momentum theory of a rotor in forward flight",
     region="strongest at low airspeed",
     occasional=True,
+    stirs=True,
     parameters=(
         Parameter("induced_velocity", "m/s", 0.0, 15.0, minimum=0.3, step=0.1),
         Parameter("wake_skew", "1", 0.0, 1.5, minimum=0.0, step=0.05),
+        Parameter("forward", "1", -1.0, 1.0, healthy=None, step=0.05),
+        Parameter("leftward", "1", -1.0, 1.0, healthy=None, step=0.05),
     ),
     applies=_is_platform,
     update=_downwash,
     templates=(
-        {"induced_velocity": 0.5, "wake_skew": 0.0},
-        {"induced_velocity": 0.5, "wake_skew": 0.5},
+        {"induced_velocity": 0.5, "wake_skew": 0.0, "forward": 0.0, "leftward": 0.0},
+        {"induced_velocity": 0.5, "wake_skew": 0.5, "forward": 0.0, "leftward": 0.0},
     ),
     confusable={"calibration_offset": "rotors off, the same wind"},
     size=lambda values: abs(values["induced_velocity"]) / 0.3,
