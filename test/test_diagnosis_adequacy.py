@@ -384,3 +384,10 @@ def test_a_fit_with_derivatives_carried_along_ends_where_an_exact_one_does() -> 
 def test_a_wake_as_wide_as_the_search_allows_is_none(width: float, possible: bool) -> None:
     values = {"bearing_from": 200.0, "depth": 0.3, "width": width, "flank": 0.0}
     assert is_plausible(Term(catalogue()["wake_shadow"], "cup", values)) is possible
+
+
+@pytest.mark.parametrize(("deflection", "possible"), [(0.0, True), (1.0, True), (1.5, False)])
+def test_a_flow_past_a_mast_bends_as_potential_flow_does(deflection: float, possible: bool) -> None:
+    values = {"cosine_1": 0.05, "sine_1": 0.0, "cosine_2": 0.03, "sine_2": 0.0}
+    term = Term(catalogue()["flow_distortion"], "station", {**values, "deflection": deflection})
+    assert is_plausible(term) is possible

@@ -71,6 +71,14 @@ def test_a_delay_that_grows_while_it_lasts_is_no_latency(
     naming = named(searcher, null, late)
     assert naming.gain > 40.0
     assert varies(naming, STATION) is growing
+    # Beside a form that is not certain on the same signals, what varies may be that one's.
+    heavy = Term(catalogue()["vane_inertia"], "vane", {"inertia_factor": 1.1})
+    beside = replace(naming, fit=replace(naming.fit, terms=(*naming.fit.terms, heavy)))
+    assert not varies(beside, STATION)
+    # On other signals it is not.
+    slow = Term(catalogue()["rotor_inertia"], "cup", {"inertia_factor": 1.1})
+    apart = replace(naming, fit=replace(naming.fit, terms=(*naming.fit.terms, slow)))
+    assert varies(apart, STATION) is growing
 
 
 @pytest.mark.parametrize(

@@ -13,14 +13,22 @@ from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.decision import unstirred
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import Alternative, Naming, no_terms
 from wind_sensors.diagnosis.findings import equal_explanations
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit
 from wind_sensors.diagnosis.moments import is_steady
+from wind_sensors.diagnosis.moves import merged
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import Searcher, searcher_of
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.station.signals import Series
 
 FloatArray = npt.NDArray[np.float64]
+
+DISTORTION = {
+    "cosine_1": 0.08, "sine_1": -0.04, "cosine_2": 0.05, "sine_2": 0.05, "deflection": 1.0,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -121,3 +129,46 @@ def test_what_passes_and_would_not_be_named_is_no_rival(
     alternatives = (Alternative(replace(drifted.fit, terms=terms), 4.0),)
     found = equal_explanations(replace(drifted, gain=gain, alternatives=alternatives))
     assert bool(found) is equal
+
+
+def test_an_axis_that_leans_for_some_minutes_is_found_though_small_leans_show_no_way() -> None:
+    since = (60.0, 240.0)
+    lean = {"tilt_x": 10.0, "tilt_y": 26.0}
+    station = with_effect(STATION, catalogue()["axis_tilt"], "station", lean, since)
+    found = diagnose(recorded(station, 78, swing=0.6), baseline(), with_proof=False)
+    (term,) = found.naming.fit.terms
+    assert term.effect.name == "axis_tilt"
+    assert term.interval[0] == pytest.approx(since[0], abs=15.0)
+    assert term.interval[1] == pytest.approx(since[1], abs=15.0)
+
+
+def test_a_grease_tells_nothing_of_its_stiffening_within_minutes_at_one_temperature() -> None:
+    recording = recorded(STATION, 75)
+    minutes = np.arange(0, recording.stop, 1_000_000_000)
+    rising = np.where(minutes < 200e9, 15.0 - 5.0 * np.sin(minutes / 60e9), 15.0)
+    warm = replace(recording, temperature=Series(minutes, rising))
+    searcher = searcher_of(prepare(warm), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    stiff = {"friction_speed": 1.0, "temperature_coefficient": -0.05, "breakaway": 1.0}
+    for interval, tells in ((ALWAYS, True), ((210.0, None), False)):
+        braked = Term(catalogue()["bearing_friction"], "cup", stiff, interval)
+        (fitted,) = fit(null, STATION, [braked], searcher.bank.without, iterations=2).terms
+        assert (fitted.values["temperature_coefficient"] != 0.0) is tells
+
+
+def test_a_search_without_some_effects_does_not_end_with_one_of_them() -> None:
+    drifted = with_effect(STATION, catalogue()["flow_distortion"], "station", DISTORTION)
+    searcher = searcher_of(
+        prepare(recorded(drifted, 76, swing=1.0)), baseline(), catalogue(), {}
+    )
+    null = searcher.whitener(searcher.bank.without)
+    terms = [
+        Term(catalogue()["calibration_drift"], "cup", {"gain": 1.02}),
+        Term(catalogue()["vane_eccentricity"], "vane", {"sine": 1.0, "cosine": 1.0}),
+    ]
+    both = fit(null, STATION, terms, searcher.bank.without)
+    one = merged(searcher, null, both, [], frozenset())
+    assert [t.effect.name for t in one.terms] == ["flow_distortion"]
+    assert merged(searcher, null, both, [], frozenset({"flow_distortion"})) is both
+    # A single effect has nothing to merge with.
+    assert merged(searcher, null, one, [], frozenset()) is one

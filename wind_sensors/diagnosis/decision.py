@@ -43,7 +43,7 @@ STIRRED_KINDS = frozenset({"frequency", "spectrum", "activity"})
 
 REMAINDER_SCORE = 0.8
 REMAINDER_SHARE = 0.025
-LEAST_REMAINDER = 0.01
+LEAST_REMAINDER = 0.006
 """A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
 times its share of what there was to explain is more than the second, and that share more than the
 third: of a large effect the form may leave more."""

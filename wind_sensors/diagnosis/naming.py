@@ -259,10 +259,13 @@ def _with_sharp_intervals(
     ]
     lasting = [r for r in ranked if not any(r is p for p in passing)]
     sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
-    others = [*searcher.refit_all(null, _fuller(searcher, sharp))]
+    others = searcher.refit_all(null, _fuller(searcher, sharp))
     if sharp:
         others += searcher.fit_all(null, named, _blind(searcher, sharp))
     sound = judged(searcher, [f for f in others if plausible(f)], named)
+    if sound and sound[0].evidence < sharp[0].evidence:
+        # The interval is that of another effect so far.
+        sound += judged(searcher, [sharper(sound[0])], named)
     return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
 
 
