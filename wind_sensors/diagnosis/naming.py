@@ -30,7 +30,7 @@ from wind_sensors.diagnosis.explanation import (
     total,
 )
 from wind_sensors.diagnosis.findings import EQUAL_LIKELIHOOD
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import BLIND_IN_PARTS
 from wind_sensors.diagnosis.moves import looked_around, merged, pruned, simplified, swapped
 from wind_sensors.diagnosis.onsets import ONSET_GAIN, refined_interval, window_starts, with_interval
@@ -43,8 +43,8 @@ from wind_sensors.diagnosis.whitening import Whitener
 MOST_EFFECTS = 2
 
 NARROW_SHARE = 0.85
-"""Effects of single instruments win over broad ones from this share of their gain on, if they
-need fewer parameters."""
+"""Effects of single instruments win over broad ones from this share of their gain on, beyond what
+both explanations share, if they need fewer parameters."""
 
 BROAD_PARAMETERS = 3
 """From so many fitted parameters on, an explanation with a broad effect is challenged."""
@@ -102,7 +102,20 @@ def name(
         0 < narrow.fit.active < found.fit.active
         and len(narrow.fit.terms) <= len(found.fit.terms)
     )
-    return narrow if simpler and narrow.gain > NARROW_SHARE * found.gain else found
+    if not simpler:
+        return found
+    enough = NARROW_SHARE * _gain_beside(searcher, found, narrow)
+    return narrow if _gain_beside(searcher, narrow, found) > enough else found
+
+
+def _gain_beside(searcher: Searcher, one: Naming, other: Naming) -> float:
+    """Drop of the cost by those effects of an explanation that another one does not have."""
+    known = {term.key for term in other.fit.terms}
+    shared = [term for term in one.fit.terms if term.key in known]
+    if not shared:
+        return one.gain
+    without = fit(one.whitener, searcher.station, shared, searcher.bank.without, least=ROUGHLY)
+    return without.cost - one.fit.cost
 
 
 def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
 from wind_sensors.station.model import (
     Angle,
@@ -78,10 +80,17 @@ def _distortion(entry: Entry, values: Values) -> dict[str, Any]:
     }
 
 
+_DIRECTIONS = np.radians(np.arange(0.0, 360.0, 5.0))
+
+
 def _distortion_size(values: Values) -> float:
-    first = math.hypot(values["cosine_1"], values["sine_1"])
-    second = math.hypot(values["cosine_2"], values["sine_2"])
-    return max(first, second) / 0.02
+    change = (
+        values["cosine_1"] * np.cos(_DIRECTIONS)
+        + values["sine_1"] * np.sin(_DIRECTIONS)
+        + values["cosine_2"] * np.cos(2.0 * _DIRECTIONS)
+        + values["sine_2"] * np.sin(2.0 * _DIRECTIONS)
+    )
+    return float(np.abs(change).max()) / 0.02
 
 
 _HARMONICS = ("cosine_1", "sine_1", "cosine_2", "sine_2")
