@@ -116,3 +116,23 @@ def test_a_term_on_other_signals_leaves_the_first_one_alone() -> None:
     assert both.cost < first.cost - 50.0
     again = Term(effects["calibration_drift"], "cup", {"gain": 1.02})
     assert not searcher.is_apart(first, again)
+
+
+def test_a_loud_effect_beside_a_distorted_flow_does_not_hide_what_the_flow_brings() -> None:
+    # Nearly all that both bring comes from the pulses: any second effect has most of it.
+    effects = catalogue()
+    bounce = {"bounce_probability": 0.06, "bounce_delay": 0.002}
+    flow = {"cosine_1": 0.05, "sine_1": -0.02, "cosine_2": 0.04, "sine_2": 0.03, "deflection": 1.0}
+    terms = [
+        Term(effects["extra_pulses"], "cup", bounce),
+        Term(effects["flow_distortion"], "station", flow),
+    ]
+    found = diagnose(recorded(planted(STATION, terms), 77, swing=1.0), baseline(), with_proof=False)
+    assert {t.effect.name for t in found.naming.fit.terms} == {"extra_pulses", "flow_distortion"}
+
+
+def test_a_flow_is_as_distorted_as_where_it_changes_most() -> None:
+    flow = {"cosine_1": 0.03, "sine_1": 0.0, "cosine_2": 0.03, "sine_2": 0.0, "deflection": 1.0}
+    assert catalogue()["flow_distortion"].relative_size(flow) == pytest.approx(0.06 / 0.02)
+    opposed = {**flow, "cosine_1": 0.0}
+    assert catalogue()["flow_distortion"].relative_size(opposed) == pytest.approx(0.03 / 0.02)
