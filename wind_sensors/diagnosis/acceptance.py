@@ -253,7 +253,10 @@ def is_plausible(term: Term) -> bool:
         margin = 0.02 * (parameter.high - parameter.low)
         shapes = parameter.healthy is None and not parameter.wraps
         fitted = shapes and parameter.value_from == "fit"
-        if fitted and term.values[parameter.name] > parameter.high - margin:
+        beyond = term.values[parameter.name] > parameter.high - margin
+        if parameter.low == -parameter.high:
+            beyond |= term.values[parameter.name] < parameter.low + margin
+        if fitted and beyond:
             # A wake as wide as half the horizon is none, nor does a flow past a mast bend more.
             return False
         if not parameter.graded or parameter.healthy is None or parameter.minimum <= 0.0:

@@ -308,16 +308,17 @@ ROTOR_DOWNWASH = Effect(
     occasional=True,
     stirs=True,
     parameters=(
-        Parameter("induced_velocity", "m/s", 0.0, 15.0, minimum=0.3, step=0.1),
-        Parameter("wake_skew", "1", 0.0, 1.5, minimum=0.0, step=0.05),
-        Parameter("forward", "1", -1.0, 1.0, healthy=None, step=0.05),
-        Parameter("leftward", "1", -1.0, 1.0, healthy=None, step=0.05),
+        Parameter("induced_velocity", "m/s", 0.0, 10.0, minimum=0.3, step=0.1),
+        # A jet blows down above all: what hardly does is no jet.
+        Parameter("wake_skew", "1", 0.0, 0.4, healthy=None, step=0.05),
+        Parameter("forward", "1", -0.4, 0.4, healthy=None, step=0.05),
+        Parameter("leftward", "1", -0.4, 0.4, healthy=None, step=0.05),
     ),
     applies=_is_platform,
     update=_downwash,
     templates=(
         {"induced_velocity": 0.5, "wake_skew": 0.0, "forward": 0.0, "leftward": 0.0},
-        {"induced_velocity": 0.5, "wake_skew": 0.5, "forward": 0.0, "leftward": 0.0},
+        {"induced_velocity": 0.5, "wake_skew": 0.3, "forward": 0.0, "leftward": 0.0},
     ),
     confusable={"calibration_offset": "rotors off, the same wind"},
     size=lambda values: abs(values["induced_velocity"]) / 0.3,
