@@ -29,8 +29,9 @@ record: a size of its own in one of them must not drop the cost by more than thi
 share of the gain."""
 
 GROWS = 12.0
+GROWS_SHARE = 0.02
 """Nor may a size that grows or shrinks steadily through the record drop it by more than this, or
-than that share of the gain."""
+than this share of the gain: a clock that drifts is no delay."""
 
 LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
@@ -113,7 +114,7 @@ def varies(naming: Naming, station: Station) -> bool:
             power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
             if np.any((parts @ left) ** 2 / power > max(VARIES, share)):
                 return True
-        if _drop_by_growth(cells, left) > max(GROWS, share):
+        if _drop_by_growth(cells, left) > max(GROWS, GROWS_SHARE * naming.gain):
             return True
     return False
 
