@@ -78,6 +78,11 @@ def test_what_refuses_fast_turns_is_no_filter_for_it_leaves_slow_ones_alone() ->
         assert is_uneven(naming, STATION) is uneven
 
 
+def test_what_refuses_fast_turns_has_no_name() -> None:
+    refusing = _slewed(recorded(STATION, 63), np.radians(14.0))
+    assert diagnose(refusing, baseline()).verdict == "unknown"
+
+
 def test_what_no_effect_describes_is_unknown() -> None:
     # A reading that creeps away and back within the record: not an offset, not a disc off centre.
     recording = recorded(STATION, 61)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from representatives import represented
+from scipy.signal import lfilter
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparison import BANDS
@@ -16,6 +17,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import (
     Grid,
+    change_statistics,
     rate_series,
     step_statistics,
     stillness_statistics,
@@ -129,6 +131,34 @@ def test_a_vane_that_creeps_and_jumps_is_stiller_than_one_that_swings() -> None:
     standing = stillness_statistics(noise, swinging, speed)
     assert np.all(standing <= still + 1.3)
     assert np.all(standing < -2.5)
+
+
+def test_a_limit_makes_the_largest_changes_smaller_than_damping_does() -> None:
+    rng = np.random.default_rng(8)
+    speed = 6.0 + np.sin(np.arange(20_000) / 300.0)
+    lively = lfilter([1.0], [1.0, -0.9], rng.standard_normal(20_000))
+    # Of Gaussian changes the 98 % quantile is 2.326 / 1.150 of the 75 % one, damped or not.
+    gaussian = np.log(2.326 / 1.150)
+    damped = lfilter([0.2], [1.0, -0.8], lively)
+    for series in (lively, damped):
+        assert change_statistics(series, speed)[0] == pytest.approx(gaussian, abs=0.05)
+    limited = np.cumsum(np.clip(np.diff(lively), -1.2, 1.2))
+    assert change_statistics(limited, speed[1:])[0] < gaussian - 0.5
+    # Slow wind, masked bins and the steps into them do not count.
+    mask = np.ones(20_000)
+    mask[5_000:5_500] = 0.0
+    mended = np.where(mask > 0.5, lively, 1e3)
+    expected = change_statistics(lively, speed, mask)
+    np.testing.assert_array_equal(change_statistics(mended, speed, mask), expected)
+    slow = speed < np.quantile(speed, 1.0 / 3.0)
+    wild = np.where(slow & np.roll(slow, -1), 1e3 * rng.standard_normal(20_000), lively)
+    assert change_statistics(wild, speed)[0] == pytest.approx(gaussian, abs=0.05)
+
+
+@pytest.mark.parametrize(("size", "still"), [(300, 1.0), (5_000, 0.0)])
+def test_too_little_change_says_nothing(size: int, still: float) -> None:
+    series = still * np.random.default_rng(9).standard_normal(size)
+    assert change_statistics(series, np.full(size, 5.0)).tolist() == [0.0]
 
 
 @pytest.mark.parametrize("form", represented([0.0, 1.0, 2.0], by=(1.0,)))

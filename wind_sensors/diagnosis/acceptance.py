@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.calibrated_range import is_calm
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import Judged, no_terms, total
 from wind_sensors.diagnosis.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
@@ -68,6 +69,11 @@ where that form is certain."""
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
 
+SMALLEST_SURE = 0.35
+SURE_ALONE_GAIN = 50.0
+"""The same of the only effect, if it always holds and brings so much: nobody doubts it, and another
+name would have to take its place."""
+
 SMALLEST_TOLD = 0.4
 """The same of what the signals tell without a fit: left out, it would be a riddle."""
 
@@ -111,7 +117,7 @@ def brought(
     event in the record brings does not count.
     """
     newest = candidate.fit.terms[-1]
-    if not is_plausible(newest) or is_a_way_of_the_wind(searcher.comparison, newest):
+    if not plausible(candidate.fit) or is_a_way_of_the_wind(searcher.comparison, newest):
         return -np.inf
     whitener = candidate.whitener
     before = (
@@ -121,6 +127,8 @@ def brought(
     )
     comparison = searcher.comparison
     if not is_steady(comparison, before, candidate.fit):
+        return -np.inf
+    if too_small(searcher, candidate.fit, total(before)):
         return -np.inf
     gain = total(before) - total(candidate.fit)
     gain -= single_event(comparison, before, candidate.fit)
@@ -237,17 +245,49 @@ def plausible(candidate: Fit) -> bool:
 
     A search that ran into the bounds of a parameter has found the wrong effect.
     """
-    return is_plausible(candidate.terms[-1])
+    return is_plausible(candidate.terms[-1], least_size(candidate.terms))
 
 
-def large_enough(term: Term) -> bool:
+def all_plausible(candidate: Fit) -> bool:
+    """Whether all terms are."""
+    least = least_size(candidate.terms)
+    return all(is_plausible(term, least) for term in candidate.terms)
+
+
+def least_size(terms: Sequence[Term]) -> float:
+    """How large terms have to be, in units of the smallest size worth reporting."""
+    alone = len(terms) == 1 and terms[0].interval == ALWAYS
+    return SMALLEST_SURE if alone else SMALLEST_SIZE
+
+
+def too_small(searcher: Searcher, candidate: Fit, nothing: float) -> bool:
+    """Whether the only term is small, and not so sure that it counts all the same.
+
+    In a calm nothing is sure: rotors near their starting speed do what no simulation does.
+
+    Args:
+        searcher: The search.
+        candidate: The explanation.
+        nothing: Cost beyond parameters without any effect, in the same null.
+    """
+    if len(candidate.terms) != 1 or large_enough(candidate.terms[0]):
+        return False
+    return is_calm(searcher.comparison) or nothing - total(candidate) < SURE_ALONE_GAIN
+
+
+def large_enough(term: Term, least: float = SMALLEST_SIZE) -> bool:
     """Whether a term matters."""
-    return term.relative_size >= (SMALLEST_TOLD if term.is_told else SMALLEST_SIZE)
+    return term.relative_size >= (SMALLEST_TOLD if term.is_told else least)
 
 
-def is_plausible(term: Term) -> bool:
-    """Whether one term is."""
-    if not large_enough(term):
+def is_plausible(term: Term, least: float = SMALLEST_SIZE) -> bool:
+    """Whether one term is.
+
+    Args:
+        term: The term.
+        least: Size that it must have, in units of the smallest worth reporting.
+    """
+    if not large_enough(term, least):
         return False
     for parameter in term.effect.parameters:
         margin = 0.02 * (parameter.high - parameter.low)

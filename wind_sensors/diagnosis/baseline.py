@@ -11,7 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity
-from wind_sensors.diagnosis.observation import ERRATIC, NORMALISED_BANDS, STEPS, Channel
+from wind_sensors.diagnosis.observation import (
+    ERRATIC,
+    NORMALISED_BANDS,
+    STEPS,
+    Channel,
+    channels_of,
+)
 from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
@@ -40,12 +46,14 @@ _STATION_INTERVALS = (0.004, 0.004, 0.006, 0.002, 0.0014, 0.002)
 _STATION_STILLNESS = (0.24, 0.24, 0.24)
 _STATION_ERRATIC = 0.006
 _STATION_STEPS = 0.2
+_STATION_CHANGES = (0.08,)
 
 _DAILY_SPECTRUM = 0.12
 _DAILY_INTERVALS = (0.0008, 0.0008, 0.0008, 0.0003, 0.0001, 0.00008)
 _DAILY_STILLNESS = (0.11, 0.09, 0.06)
 _DAILY_ERRATIC = 0.001
 _DAILY_STEPS = 0.01
+_DAILY_CHANGES = (0.06,)
 """A station's discs, slots and bearings are the same on every day: from day to day a statistic
 departs by far less from what its station usually shows than any station does from its simulation.
 """
@@ -62,8 +70,8 @@ def station_deviation(channel: Channel) -> FloatArray:
     bands = np.full(_BANDS, _STATION_SPECTRUM)
     if channel.kind == "vane_angle":
         erratic, steps = np.full(ERRATIC, _STATION_ERRATIC), np.full(STEPS, _STATION_STEPS)
-        return np.concatenate((bands, _STATION_STILLNESS, erratic, steps))
-    return np.concatenate((bands, _STATION_INTERVALS))
+        return np.concatenate((bands, _STATION_STILLNESS, erratic, steps, _STATION_CHANGES))
+    return np.concatenate((bands, _STATION_INTERVALS, _STATION_CHANGES))
 
 
 def daily_deviation(channel: Channel) -> FloatArray:
@@ -71,8 +79,8 @@ def daily_deviation(channel: Channel) -> FloatArray:
     bands = np.full(_BANDS, _DAILY_SPECTRUM)
     if channel.kind == "vane_angle":
         erratic, steps = np.full(ERRATIC, _DAILY_ERRATIC), np.full(STEPS, _DAILY_STEPS)
-        return np.concatenate((bands, _DAILY_STILLNESS, erratic, steps))
-    return np.concatenate((bands, _DAILY_INTERVALS))
+        return np.concatenate((bands, _DAILY_STILLNESS, erratic, steps, _DAILY_CHANGES))
+    return np.concatenate((bands, _DAILY_INTERVALS, _DAILY_CHANGES))
 
 
 def calm_deviation(statistics: int, mean_speed: float) -> FloatArray:
@@ -241,7 +249,7 @@ class Baseline:
         """
         content = json.loads(text)
         try:
-            return Baseline(
+            known = Baseline(
                 recordings=tuple(content["recordings"]),
                 original=Station.model_validate(content["original"]),
                 station=Station.model_validate(content["station"]),
@@ -259,6 +267,11 @@ class Baseline:
             )
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a baseline: {problem}") from problem
+        for channel in channels_of(known.station):
+            kept = known.channels.get(channel.name)
+            if kept and kept.statistics_mean.size != station_deviation(channel).size:
+                raise ValueError(f"not a baseline: other statistics of {channel.name}")
+        return known
 
 
 def _listed(values: FloatArray) -> list[float | None]:

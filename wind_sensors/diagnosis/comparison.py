@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.observation import (
     Channel,
     Grid,
     angle_series,
+    change_statistics,
     erratic_statistics,
     interval_statistics,
     rate_series,
@@ -66,7 +67,7 @@ class Simulated:
         cosine: Cosine coefficients of each channel's series up to `HIGHEST_FREQUENCY`, by name.
         series: The series, by channel name: m/s for a rotor, lateral m/s for a vane.
         statistics: By channel name: log spectra in the normalised bands (nan: band not seen),
-            for rotors followed by the interval statistics.
+            followed by what `STATISTICS` lists for its kind.
         levels: By channel name: logarithm of the power of quick eddies in each segment, shape
             (bands, segments).
         counted: Segments that count, shape (segments,).
@@ -311,7 +312,8 @@ class Comparison:
                 full = spectra.to_cosine(self.masked(values - np.mean(values)))
                 full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
                 bands = self._log_spectrum(full, self.grid.dt, channel, 2.2)
-                statistics[channel.name] = np.concatenate((bands, intervals))
+                changes = change_statistics(values, self.speed, self.mask)
+                statistics[channel.name] = np.concatenate((bands, intervals, changes))
             else:
                 readings = angles[channel.instrument]
                 expected = self.expected.get(channel.name)
@@ -331,6 +333,7 @@ class Comparison:
                         ),
                         erratic_statistics(readings, self.direction, self.grid, self.mask),
                         step_statistics(readings, self.grid, self.mask),
+                        change_statistics(deviation + self.direction, self.speed, self.mask),
                     )
                 )
             series[channel.name] = values

@@ -57,8 +57,9 @@ with: a small jet from above moves nothing that turns about an upright axis."""
 BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift", "bearing_friction", "rotor_downwash"})
 """Effects that are tried whether or not the screening sees them."""
 
-BLIND_IN_PARTS = BLIND_EFFECTS - {"clock_drift"}
-"""The same of those that may hold for some minutes; a clock that drifted then stays wrong."""
+BLIND_IN_PARTS = (BLIND_EFFECTS - {"clock_drift"}) | {"potentiometer_gap"}
+"""Effects that are tried in the minutes in which others are seen: the blind ones but a clock that
+drifted, which stays wrong, and a gap that the wind crosses on its way through other directions."""
 
 DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each

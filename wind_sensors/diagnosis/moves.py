@@ -9,6 +9,7 @@ from dataclasses import replace
 from wind_sensors.diagnosis.acceptance import (
     ACCEPTED_FURTHER_GAIN,
     ACCEPTED_GAIN,
+    all_plausible,
     inexact,
     is_plausible,
     large_enough,
@@ -17,6 +18,7 @@ from wind_sensors.diagnosis.acceptance import (
     overlap,
     plausible,
     times_beside,
+    too_small,
 )
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explanation import (
@@ -119,9 +121,9 @@ def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         current: The explanation.
     """
     nothing = no_terms(whitener, searcher)
-    while not all(is_plausible(term) for term in current.terms):
+    while not all_plausible(current) or too_small(searcher, current, total(nothing)):
         fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms))
-        sound = [f for f in fewer if f.terms and all(is_plausible(t) for t in f.terms)]
+        sound = [f for f in fewer if f.terms and all_plausible(f)]
         sound = sound or [f for f in fewer if f.terms]
         if not sound:
             return nothing

@@ -11,10 +11,12 @@ from wind_sensors.diagnosis.acceptance import (
     brought,
     inexactness,
     is_a_stall,
+    is_plausible,
     may_join,
     needed_gain,
     passing_gain,
     plausible,
+    too_small,
 )
 from wind_sensors.diagnosis.explanation import (
     CLEARLY_BETTER,
@@ -241,7 +243,7 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
     (other,) = judged(searcher, [always], named)
     allowed = -ONSET_GAIN if read else CLEARLY_BETTER
-    as_well = plausible(other.fit) and other.evidence < one.evidence + allowed
+    as_well = is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
     return other if as_well else one
 
 
@@ -403,7 +405,8 @@ def _greedy(
             fits = _further_fits(searcher, whitener, current, excluded)
         if progress:
             progress((turn + 0.6) / MOST_EFFECTS)
-        pool = _finalists(searcher, whitener, current, [f for f in fits if plausible(f)], named)
+        sound = [f for f in fits if plausible(f) and not too_small(searcher, f, total(current))]
+        pool = _finalists(searcher, whitener, current, sound, named)
         if not pool:
             break
         ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]

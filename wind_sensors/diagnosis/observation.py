@@ -40,6 +40,7 @@ STATISTICS = {
         "unevenness of the slots once per turn",
         "beat of the pulses with the wind, once per turn",
         "beat of the pulses with the wind, twice per turn",
+        "largest changes of the rate",
     ),
     "vane_angle": (
         "smallest turns in slow wind",
@@ -49,6 +50,7 @@ STATISTICS = {
         "direction in which readings are erratic",
         "direction in which readings are erratic",
         "steps of the readings",
+        "largest turns",
     ),
 }
 """What the statistics of a channel beyond its spectrum are, for people."""
@@ -346,6 +348,39 @@ def _smallness(turns: FloatArray, usual: FloatArray, shares: tuple[float, ...]) 
     reach = max(float(np.quantile(turns, 0.9)), LEAST_REACH * large)
     small = np.quantile(turns, shares) + STANDSTILL * large
     return np.asarray(np.log(small / reach), dtype=np.float64)
+
+
+CHANGES = 1
+"""Number of statistics of the largest changes of a series."""
+
+FEWEST_CHANGES = 500
+"""Two per cent of fewer tell of single events."""
+
+
+def change_statistics(
+    series: FloatArray, speed: FloatArray, mask: FloatArray | None = None
+) -> FloatArray:
+    """How large the largest changes from bin to bin are against the usual ones.
+
+    Damping and inertia make all changes smaller, in proportion. A limit, a play or a catch does
+    not.
+
+    Args:
+        series: Value in each bin, shape (n,).
+        speed: Slow wind speed at the bins [m/s], shape (n,); its slowest third does not count.
+        mask: Weight of the bins; those below a half do not count.
+
+    Returns:
+        Logarithm of the 98 % quantile over the 75 % one; 0 where too little changes.
+    """
+    counted = speed[1:] >= np.quantile(speed, 1.0 / 3.0)
+    if mask is not None:
+        counted &= (mask[1:] > 0.5) & (mask[:-1] > 0.5)
+    changes = np.abs(np.diff(series))[counted]
+    if changes.size < FEWEST_CHANGES:
+        return np.zeros(CHANGES)
+    usual, large = np.quantile(changes, (0.75, 0.98))
+    return np.array([np.log(large / usual) if usual > 0.0 else 0.0])
 
 
 SLOW_TURN = 2.5

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
 from wind_sensors.diagnosis.observation import INTERVALS
 from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
@@ -148,8 +148,8 @@ def oddities(
             found.append(
                 _intervals(
                     name,
-                    comparison.measured.statistics[channel][-INTERVALS:],
-                    simulated.statistics[channel][-INTERVALS:],
+                    comparison.measured.statistics[channel][BANDS : BANDS + INTERVALS],
+                    simulated.statistics[channel][BANDS : BANDS + INTERVALS],
                     pulses[name].time.size,
                     start,
                     stop,
