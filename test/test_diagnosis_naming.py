@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import lru_cache
 
@@ -198,3 +199,10 @@ def test_a_baseline_survives_its_file() -> None:
     assert again.standing == dict(baseline().standing)
     for name, channel in baseline().channels.items():
         assert again.channels[name].exponent == pytest.approx(channel.exponent)
+
+
+def test_a_baseline_with_other_statistics_is_none_of_this_version() -> None:
+    content = json.loads(baseline().to_json())
+    content["channels"]["cup/rotor_rate"]["statistics_mean"].pop()
+    with pytest.raises(ValueError, match="other statistics of cup/rotor_rate"):
+        Baseline.from_json(json.dumps(content))

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 
-from wind_sensors.diagnosis.acceptance import overlap
+from wind_sensors.diagnosis.acceptance import (
+    SMALLEST_SIZE,
+    SMALLEST_SURE,
+    SURE_ALONE_GAIN,
+    is_plausible,
+    least_size,
+    overlap,
+)
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
@@ -72,6 +79,28 @@ def test_a_larger_size_shows_what_the_scatter_of_few_pulses_hides() -> None:
     # Amplitudes stay in units of the effect's own template.
     estimate = gain["any"].amplitude * gain["any"].template.effect.templates[0]["offset"]
     assert estimate == pytest.approx(-0.4, rel=0.5)
+
+
+def test_what_is_small_but_sure_keeps_its_name() -> None:
+    # Left out for its size, uneven slots would be called a damaged cup.
+    found = diagnosed("encoder_slot_error", "cup", scatter=0.005, once_per_turn=0.006)
+    (finding,) = [f for f in found.findings if f.proof is not None]
+    assert finding.term.effect.name == "encoder_slot_error"
+    assert SMALLEST_SURE < finding.term.relative_size < SMALLEST_SIZE
+    assert finding.gain > SURE_ALONE_GAIN
+
+
+@pytest.mark.parametrize(
+    ("gain", "begins", "plausible_size"),
+    [(0.995, 0.0, True), (0.995, 60.0, False), (0.999, 0.0, False)],
+)
+def test_only_what_always_holds_may_be_small(
+    gain: float, begins: float, plausible_size: bool
+) -> None:
+    interval = (begins, None) if begins else ALWAYS
+    term = Term(catalogue()["calibration_drift"], "cup", {"gain": gain}, interval)
+    assert is_plausible(term, least_size((term,))) is plausible_size
+    assert not is_plausible(term, least_size((term, term)))
 
 
 def test_chance_on_the_borders_of_bins_is_no_information() -> None:
