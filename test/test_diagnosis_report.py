@@ -10,6 +10,7 @@ import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.baseline import ChannelBaseline
+from wind_sensors.diagnosis.comparison import BANDS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import STATISTICS, Channel
@@ -59,7 +60,8 @@ def test_what_departs_too_far_to_be_drawn_is_told_at_the_edge(far: float) -> Non
     vane = of(found, "vane_angle")
     known = found.baseline.channels[vane.name]
     mean = known.statistics_mean.copy()
-    mean[-1] -= far * known.statistics_deviation[-1]
+    place = BANDS + STATISTICS["vane_angle"].index("steps of the readings")
+    mean[place] -= far * known.statistics_deviation[place]
 
     def told_of_steps(baseline: ChannelBaseline) -> float:
         made = statistics_figure(found.comparison, baseline, found.simulated, None, vane)

@@ -356,6 +356,10 @@ CHANGES = 1
 FEWEST_CHANGES = 500
 """Two per cent of fewer tell of single events."""
 
+LEAST_USUAL = 0.2
+"""Usual changes are no less than this share of the largest: what mostly stands tells its stillness,
+and would drown all else here."""
+
 
 def change_statistics(
     series: FloatArray, speed: FloatArray, mask: FloatArray | None = None
@@ -380,7 +384,9 @@ def change_statistics(
     if changes.size < FEWEST_CHANGES:
         return np.zeros(CHANGES)
     usual, large = np.quantile(changes, (0.75, 0.98))
-    return np.array([np.log(large / usual) if usual > 0.0 else 0.0])
+    if large <= 0.0:
+        return np.zeros(CHANGES)
+    return np.array([np.log(large / max(usual, LEAST_USUAL * large))])
 
 
 SLOW_TURN = 2.5
