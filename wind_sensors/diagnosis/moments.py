@@ -87,6 +87,10 @@ def gain_in_parts(comparison: Comparison, before: Fit, after: Fit, width: int) -
     return gain
 
 
+BY_CHANCE = 2.0
+"""One moment is always the best: noise alone lets it bring so much more than the second best."""
+
+
 def single_event(comparison: Comparison, before: Fit, after: Fit) -> float:
     """How much more of a gain the best moment of the record brings than the second best.
 
@@ -107,7 +111,8 @@ def single_event(comparison: Comparison, before: Fit, after: Fit) -> float:
     around = np.convolve(gain, np.ones(together), "same")
     best = int(np.argmax(around))
     elsewhere = np.abs(np.arange(gain.size) - best) >= together
-    return float(max(around[best] - max(np.max(around[elsewhere]), 0.0), 0.0))
+    more = float(around[best] - max(np.max(around[elsewhere]), 0.0))
+    return more if more > BY_CHANCE else 0.0
 
 
 def is_its_moment(searcher: Searcher, current: Fit, further: Term) -> bool:
