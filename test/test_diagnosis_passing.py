@@ -14,11 +14,12 @@ from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.decision import unstirred
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Alternative, Naming, no_terms
+from wind_sensors.diagnosis.explanation import Alternative, Judged, Naming, no_terms
 from wind_sensors.diagnosis.findings import equal_explanations
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit
-from wind_sensors.diagnosis.moments import is_steady
+from wind_sensors.diagnosis.moments import is_steady, single_event
 from wind_sensors.diagnosis.moves import merged
+from wind_sensors.diagnosis.naming import blind_starts
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import Searcher, searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
@@ -72,6 +73,51 @@ def test_what_passes_gains_all_the_time_that_it_holds(
     bounce = {"bounce_probability": 0.02, "bounce_delay": 0.001}
     drawn = Term(catalogue()["extra_pulses"], "cup", bounce, (50.0, 250.0))
     assert is_steady(comparison, before, seen(noise, drawn))
+
+
+@pytest.mark.parametrize(("gust", "taken_off"), [(0.0, False), (1.5, False), (40.0, True)])
+def test_a_gust_is_taken_off_a_gain_but_not_that_one_moment_is_always_the_best(
+    searcher: Searcher, gust: float, taken_off: bool
+) -> None:
+    comparison = searcher.comparison
+    nothing = no_terms(searcher.whitener(searcher.bank.without), searcher)
+    seconds = comparison.grid.centres
+    steady = np.full(comparison.grid.n, 2.0 * 24 / comparison.grid.n)
+    lasting = 0.08 * seconds[-1]
+    bump = np.exp(-0.5 * ((seconds - 0.4 * seconds[-1]) / (lasting / 6.0)) ** 2)
+    misfit = np.sqrt(steady + gust * bump / bump.sum())
+
+    def seen(series: FloatArray) -> Fit:
+        vector = in_first_channel(comparison, series, nothing.vector.size)
+        return replace(nothing, terms=(drift(),), vector=vector, cost=float(vector @ vector))
+
+    more = single_event(comparison, seen(misfit), seen(np.zeros(comparison.grid.n)))
+    assert more == pytest.approx(gust if taken_off else 0.0, rel=0.1)
+
+
+def test_where_another_effect_passes_one_that_the_screening_hardly_sees_is_tried_too(
+    searcher: Searcher,
+) -> None:
+    null = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(null, searcher)
+    gap = Term(
+        catalogue()["potentiometer_gap"],
+        "vane",
+        {"centre": 40.0, "width": 10.0, "reading": 35.0},
+    )
+    rotor = Term(catalogue()["missed_pulses"], "cup", {"dead_time": 0.01, "loss_probability": 0.0})
+    guesses = {(t.effect.name, t.instrument): (t,) for t in (gap, rotor)}
+    guessing = replace(searcher, guesses=guesses)
+    eccentric = Term(
+        catalogue()["vane_eccentricity"], "vane", {"sine": 3.0, "cosine": 1.0}, (100.0, None)
+    )
+
+    def starts(term: Term) -> list[list[Term]]:
+        return blind_starts(guessing, [Judged(replace(nothing, terms=(term,)), null, 0.0)])
+
+    # Beside an effect of the vane the vane's, in its minutes; beside itself not again.
+    assert starts(eccentric) == [[replace(gap, interval=(100.0, None))]]
+    assert starts(replace(gap, interval=(100.0, None))) == []
 
 
 def named(searcher: Searcher, term: Term, alternatives: tuple[Alternative, ...] = ()) -> Naming:

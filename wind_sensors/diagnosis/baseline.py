@@ -11,13 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity
-from wind_sensors.diagnosis.observation import (
-    ERRATIC,
-    NORMALISED_BANDS,
-    STEPS,
-    Channel,
-    channels_of,
-)
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel, channels_of
+from wind_sensors.diagnosis.raw_statistics.vanes import ERRATIC, STEPS
 from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 

@@ -22,10 +22,12 @@ from wind_sensors.diagnosis.observation import (
     Channel,
     Grid,
     angle_series,
-    change_statistics,
-    erratic_statistics,
-    interval_statistics,
     rate_series,
+)
+from wind_sensors.diagnosis.raw_statistics.changes import change_statistics
+from wind_sensors.diagnosis.raw_statistics.pulses import interval_statistics
+from wind_sensors.diagnosis.raw_statistics.vanes import (
+    erratic_statistics,
     step_statistics,
     stillness_statistics,
 )

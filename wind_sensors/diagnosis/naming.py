@@ -276,7 +276,7 @@ def _with_sharp_intervals(
     sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
     others = searcher.refit_all(null, _fuller(searcher, sharp))
     if sharp:
-        others += searcher.fit_all(null, named, _blind(searcher, sharp))
+        others += searcher.fit_all(null, named, blind_starts(searcher, sharp))
     sound = judged(searcher, [f for f in others if plausible(f)], named)
     if sound and sound[0].evidence < sharp[0].evidence:
         # The interval is that of another effect so far.
@@ -284,7 +284,7 @@ def _with_sharp_intervals(
     return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
 
 
-def _blind(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
+def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
     """Starting points, in the best of the intervals, of effects that the screening hardly sees.
 
     Of those that act on the signals which the last effect there reaches.

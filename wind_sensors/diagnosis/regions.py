@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.comparison import BANDS, LOW_END, Comparison, Simulated
-from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STATISTICS, Channel
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]

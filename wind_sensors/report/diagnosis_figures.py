@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import ChannelBaseline
 from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
-from wind_sensors.diagnosis.observation import NORMALISED_BANDS, STATISTICS, Channel
+from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.regions import eddies
 from wind_sensors.report import style
 
