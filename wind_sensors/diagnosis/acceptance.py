@@ -148,9 +148,7 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
         return 0.0
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf
-    nothing = whitener.of(searcher.bank.without)
-    own = inexact(current, float(nothing @ nothing)) * overlap(searcher, current, longer)
-    return times_beside(further) * own
+    return times_beside(further) * inexact(searcher, whitener, current, longer)
 
 
 def times_beside(further: Term) -> float:
@@ -159,21 +157,47 @@ def times_beside(further: Term) -> float:
     return PASSING_BESIDE if passing else 1.0
 
 
-def inexact(current: Fit, nothing: float) -> float:
-    """What the simulation's own inexactness is worth on the signals that an effect reaches.
+def inexact(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> float:
+    """What the simulation's own inexactness is worth where further effects act.
 
     Args:
-        current: The explanation so far.
-        nothing: Cost without any effect.
+        searcher: The search.
+        whitener: A null.
+        fewer: An explanation.
+        more: One with further effects.
     """
-    gained = nothing - current.cost
-    if all(term.effect.exact for term in current.terms):
+    gained = gained_alike(searcher, whitener, fewer, more)
+    if all(term.effect.exact for term in fewer.terms):
         share, largest = FURTHER_EXACT_SHARE, LARGEST_EXACT_INEXACTNESS
         least = LEAST_EXACT_SHARE_BESIDE
     else:
         share, largest, least = FURTHER_SHARE, LARGEST_INEXACTNESS, LEAST_SHARE_BESIDE
     most = max(largest, least * gained)
-    return min(max(share * gained, ACCEPTED_FURTHER_GAIN), most)
+    own = min(max(share * gained, ACCEPTED_FURTHER_GAIN), most)
+    return own * overlap(searcher, fewer, more)
+
+
+def gained_alike(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> float:
+    """What an explanation gains in the kinds of comparison in which further effects act.
+
+    Slots of the wrong width are seen in the intervals of pulses, with certainty; what moves the
+    mean of the same rotor has nothing to do with their form.
+
+    Args:
+        searcher: The search.
+        whitener: A null.
+        fewer: An explanation.
+        more: One with further effects.
+    """
+    nothing = whitener.of(searcher.bank.without)
+    before, after = whitener.of(fewer.simulated), whitener.of(more.simulated)
+    part = searcher.comparison.part_of_each
+    gained = np.bincount(part, nothing**2 - before**2)
+    changed = np.bincount(part, (after - before) ** 2)
+    total_change = float(changed.sum())
+    if total_change <= 0.0:
+        return float(np.maximum(gained, 0.0).sum())
+    return float(np.maximum(gained, 0.0) @ changed) / total_change
 
 
 def overlap(searcher: Searcher, fewer: Fit, more: Fit) -> float:

@@ -449,6 +449,16 @@ class Comparison:
             )
         )
 
+    @property
+    def part_of_each(self) -> npt.NDArray[np.int_]:
+        """Number of the part (series, statistics, activity of each channel) of each, shape (l,)."""
+        kinds = np.zeros(self.channel_of_each.size, dtype=np.int_)
+        statistics = len(self.channels) * self.coefficients
+        activities = sum(self.measured.levels[c.name].size for c in self.channels)
+        kinds[statistics:] = 1
+        kinds[kinds.size - activities :] = 2
+        return self.channel_of_each + len(self.channels) * kinds
+
     def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
         """How far `vector` falls when what is compared rises by one, shape (l,)."""
         parts = [trust[c.name].slope / trust[c.name].deviation for c in self.channels]

@@ -100,6 +100,8 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
             if parameter.value_from == "signals" and parameter.graded:
                 noise = 0.0
+            elif parameter.value_from == "signals" and parameter.step:
+                noise = parameter.step
             # What an inexact form adds to one component of an effect, it takes from others.
             size = max(abs(departure), term.relative_size * parameter.minimum)
             error = INTERVAL_FACTOR * float(np.hypot(noise, term.effect.form_error * size))

@@ -74,8 +74,13 @@ class Term:
 
     @property
     def is_told(self) -> bool:
-        """Whether the signals tell everything about it."""
-        return all(p.value_from == "signals" for p in self.effect.parameters)
+        """Whether the signals tell everything about it, that it is this among it.
+
+        Silence they tell, but not whether the sensor or its bearing is stuck.
+        """
+        return not self.effect.occasional and all(
+            p.value_from == "signals" for p in self.effect.parameters
+        )
 
 
 def planted(station: Station, terms: Sequence[Term]) -> Station:

@@ -27,6 +27,9 @@ LONGEST_REPEAT = 4.0
 LONGEST_SILENCE = 4.0
 """A rotor without a pulse for longer [s], while it should turn fast, is taken to be silent."""
 
+STRAY_BESIDE = 10.0
+"""A pulse with more than so many missing before it and after it is a stray one: silence goes on."""
+
 LEAN = 15.0
 """Lean of the axis [deg] from which its fit begins: what it does to a rotor grows with its square,
 so that a small lean shows no way."""
@@ -260,13 +263,26 @@ def _dead_times(
     ]
 
 
+def _run(holds: npt.NDArray[np.bool_], place: int) -> tuple[int, int]:
+    """First and last place of the run without a break around a place, which counts in any case."""
+    breaks = np.flatnonzero(~holds)
+    before, after = breaks[breaks < place], breaks[breaks > place]
+    first = int(before[-1]) + 1 if before.size else 0
+    last = int(after[0]) - 1 if after.size else holds.size - 1
+    return first, last
+
+
 def _silence(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:
     time = comparison.grid.seconds(comparison.recording.pulses[rotor.name].time)
     length = comparison.grid.n * comparison.grid.dt
     edges = np.concatenate(([0.0], np.clip(time, 0.0, length), [length]))
     gaps = np.diff(edges)
     longest = int(np.argmax(gaps))
-    begin, end = float(edges[longest]), float(edges[longest + 1])
+    turned = np.concatenate(([0.0], np.cumsum(rate) * comparison.grid.dt))
+    turned /= 2.0 * np.pi * rotor.calibration_distance
+    missed = np.diff(np.interp(edges, comparison.grid.edges, turned)) * rotor.pulses_per_revolution
+    first, last = _run(missed > STRAY_BESIDE, longest)
+    begin, end = float(edges[first]), float(edges[last + 1])
     if end - begin < LONGEST_SILENCE:
         return []
     inside = rate[int(begin / comparison.grid.dt) : int(end / comparison.grid.dt)]

@@ -15,7 +15,6 @@ from wind_sensors.diagnosis.acceptance import (
     large_enough,
     may_join,
     needed_gain,
-    overlap,
     plausible,
     times_beside,
     too_small,
@@ -194,7 +193,7 @@ def merged(
     if not ranked:
         return current
     alone = ranked[0]
-    margin = inexact(alone.fit, nothing.cost) * overlap(searcher, alone.fit, current)
+    margin = inexact(searcher, whitener, alone.fit, current)
     further = [t for t in current.terms if t.key != alone.fit.terms[0].key]
     if len(further) == len(current.terms):
         margin += ACCEPTED_FURTHER_GAIN

@@ -210,6 +210,29 @@ def explaining_what_stands_out(
     return explaining or enough
 
 
+def _leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
+    """The single effect that is left of two, or the one that led before the second came.
+
+    The first explains what stands out; only one that brings clearly more takes its place.
+
+    Args:
+        searcher: The search.
+        left: What is left of the explanation by two effects.
+        alone: The single effect that led.
+    """
+    if left.terms[0].key == alone[0].key:
+        return left
+    whitener = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(whitener, searcher)
+    so_far = evidence(nothing, whitener)
+    first = fit(whitener, searcher.station, alone, searcher.bank.without)
+    rivals = [
+        (brought(searcher, one, nothing, so_far), one) for one in judged(searcher, [left, first])
+    ]
+    rivals = explaining_what_stands_out(searcher, whitener, nothing, rivals)
+    return max(rivals, key=lambda rival: rival[0])[1].fit
+
+
 def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -> bool:
     """Whether an effect that passes would explain nearly as much if it always held."""
     newest = one.fit.terms[-1]
@@ -438,6 +461,7 @@ def _greedy(
             current, alternatives = swapped(searcher, whitener, current, excluded)
         else:
             alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
+            current = _leading_alone(searcher, current, alone)
     if progress:
         progress(1.0)
     return _settled(searcher, current, alternatives, screened)

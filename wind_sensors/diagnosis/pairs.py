@@ -19,7 +19,6 @@ from wind_sensors.diagnosis.acceptance import (
     is_plausible,
     large_enough,
     may_join,
-    overlap,
     plausible,
 )
 from wind_sensors.diagnosis.explanation import (
@@ -85,7 +84,7 @@ def better_pair(
     nothing = no_terms(leader.whitener, searcher)
     margin = max(CLEARLY_BETTER, EQUAL_SHARE * (total(nothing) - total(leader.fit)))
     if best.fit.active > leader.fit.active:
-        own = inexact(leader.fit, nothing.cost) * overlap(searcher, leader.fit, best.fit)
+        own = inexact(searcher, leader.whitener, leader.fit, best.fit)
         margin = max(ACCEPTED_FURTHER_GAIN, own, margin)
     return best if best.evidence < leader.evidence - margin else None
 

@@ -173,8 +173,8 @@ STUCK_SENSOR = Effect(
     standing=0.0,
     occasional=True,
     parameters=(
-        Parameter("start", "s", -1.0, 1e6, healthy=None, step=1.0),
-        Parameter("stop", "s", 0.0, 1e6, healthy=None, step=1.0),
+        Parameter("start", "s", -1.0, 1e6, healthy=None, step=0.2, value_from="signals"),
+        Parameter("stop", "s", 0.0, 1e6, healthy=None, step=0.2, value_from="signals"),
         Parameter("reading", "deg", -540.0, 540.0, healthy=None, value_from="signals"),
         Parameter("known", "1", 0.0, 1.0, healthy=None, value_from="signals"),
     ),
