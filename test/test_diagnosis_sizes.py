@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.acceptance import (
     SMALLEST_SIZE,
     SMALLEST_SURE,
     SURE_ALONE_GAIN,
+    gained_alike,
     is_plausible,
     least_size,
     overlap,
@@ -21,11 +22,11 @@ from wind_sensors.diagnosis.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import Judged, Naming, no_terms
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, covariance_of, fit
+from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.learning import default_baseline
 from wind_sensors.diagnosis.moments import is_its_moment
-from wind_sensors.diagnosis.naming import explaining_what_stands_out
+from wind_sensors.diagnosis.naming import explaining_what_stands_out, leading_alone
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
@@ -277,3 +278,52 @@ def test_of_explanations_as_good_the_one_of_what_stands_out_leads() -> None:
     nearly, clearly = [(24.0, slow), (20.0, turned)], [(40.0, slow), (20.0, turned)]
     assert explaining_what_stands_out(searcher, null, nothing, nearly) == nearly[1:]
     assert explaining_what_stands_out(searcher, null, nothing, clearly) == clearly
+
+
+def compared(planted: Station) -> Searcher:
+    recording = replace(recorded(planted, 72), station=STATION)
+    return searcher_of(prepare(recording), baseline(), catalogue(), {})
+
+
+def test_the_form_of_an_effect_counts_in_the_kind_of_comparison_in_which_it_is_seen() -> None:
+    slots = {"scatter": 0.05, "once_per_turn": 0.1}
+    searcher = compared(with_effect(STATION, catalogue()["encoder_slot_error"], "cup", slots))
+    null = searcher.whitener(searcher.bank.without)
+    uneven = Term(catalogue()["encoder_slot_error"], "cup", slots)
+    offset = Term(catalogue()["calibration_offset"], "cup", {"offset": -0.3})
+    drift = Term(catalogue()["calibration_drift"], "cup", {"gain": 0.95})
+
+    def seen(*terms: Term) -> Fit:
+        return fit(null, STATION, list(terms), searcher.bank.without, iterations=0)
+
+    nothing = float(np.sum(null.of(searcher.bank.without) ** 2))
+    gained = nothing - seen(uneven).cost
+    # What slots gain, they gain in the pulse intervals, which no offset changes.
+    assert gained > 1000.0
+    assert gained_alike(searcher, null, seen(uneven), seen(uneven, offset)) < 0.1 * gained
+    wide = replace(uneven, values={"scatter": 0.08, "once_per_turn": 0.1})
+    assert gained_alike(searcher, null, seen(uneven), seen(wide)) > 0.9 * gained
+    slower = {"offset": -0.5}
+    both = compared(with_effect(STATION, catalogue()["calibration_offset"], "cup", slower))
+    null = both.whitener(both.bank.without)
+    far = Term(catalogue()["calibration_offset"], "cup", slower)
+    one = fit(null, STATION, [far], both.bank.without, iterations=0)
+    two = fit(null, STATION, [far, drift], both.bank.without, iterations=0)
+    gained = float(np.sum(null.of(both.bank.without) ** 2)) - one.cost
+    assert gained_alike(both, null, one, two) > 0.5 * gained
+
+
+def test_a_single_effect_that_is_left_of_two_has_to_explain_what_stands_out() -> None:
+    offset = {"offset": 4.0}
+    searcher = compared(with_effect(STATION, catalogue()["vane_offset"], "vane", offset))
+    null = searcher.whitener(searcher.bank.without)
+
+    def alone(effect: str, instrument: str, **values: float) -> Fit:
+        term = Term(catalogue()[effect], instrument, values)
+        return fit(null, STATION, [term], searcher.bank.without)
+
+    turned = alone("vane_offset", "vane", offset=4.0)
+    slow = alone("calibration_offset", "cup", offset=-0.1)
+    assert leading_alone(searcher, slow, turned.terms).terms[0].key == turned.terms[0].key
+    assert leading_alone(searcher, turned, slow.terms) is not slow
+    assert leading_alone(searcher, turned, turned.terms) is turned

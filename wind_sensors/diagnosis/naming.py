@@ -210,7 +210,7 @@ def explaining_what_stands_out(
     return explaining or enough
 
 
-def _leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
+def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
     """The single effect that is left of two, or the one that led before the second came.
 
     The first explains what stands out; only one that brings clearly more takes its place.
@@ -461,7 +461,7 @@ def _greedy(
             current, alternatives = swapped(searcher, whitener, current, excluded)
         else:
             alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
-            current = _leading_alone(searcher, current, alone)
+            current = leading_alone(searcher, current, alone)
     if progress:
         progress(1.0)
     return _settled(searcher, current, alternatives, screened)
