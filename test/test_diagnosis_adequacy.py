@@ -328,6 +328,24 @@ def test_what_acts_seldom_must_do_what_the_next_best_does() -> None:
         assert borne_out((replace(found, proof=proof),)) is borne
 
 
+@pytest.mark.parametrize(
+    ("effect", "after", "removed", "borne"),
+    [
+        ("extra_pulses", 1.0, 0.6, True),
+        ("extra_pulses", 1.0, 0.4, False),
+        ("extra_pulses", 1.3, 0.6, False),
+        ("calibration_offset", 1.0, 0.6, False),
+    ],
+)
+def test_what_is_drawn_at_random_differs_from_block_to_block(
+    effect: str, after: float, removed: float, borne: bool
+) -> None:
+    found = _finding(effect, "cup", 0.9, 0.002)
+    assert found.proof is not None
+    proof = replace(found.proof, after=after, excess_removed=removed)
+    assert borne_out((replace(found, proof=proof),)) is borne
+
+
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
     rival = replace(_finding(*ASYMMETRY, 0.9, 0.5), proof=None)
     found = (_finding(*OFFSET, 0.9, 0.002), rival)
