@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline, default_channel
 from wind_sensors.diagnosis.calibrated_range import (
@@ -20,10 +21,12 @@ from wind_sensors.diagnosis.fitting import Term
 from wind_sensors.diagnosis.learning import default_baseline, learn
 from wind_sensors.diagnosis.observation import NORMALISED_BANDS, channels_of
 from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation.run import simulate
 from wind_sensors.simulation.scenario import Scenario
 from wind_sensors.station.model import Input, Reference, Station
+from wind_sensors.station.signals import Angles
 from wind_sensors.turbulence.synthesis import TurbulenceSpec
 
 
@@ -92,3 +95,18 @@ def test_in_a_calm_spectra_may_depart_by_more_and_nothing_else() -> None:
         assert np.sqrt(fresh**2 - usual**2)[:bands] == pytest.approx(0.125)
         assert stormy == pytest.approx(usual, rel=0.01)
         assert np.array_equal(calm[bands:], usual[bands:])
+
+
+@pytest.mark.parametrize(("mean", "verdict"), [(1.0, "inconclusive"), (7.0, "unknown")])
+def test_what_has_no_name_in_a_calm_is_no_mismatch(mean: float, verdict: str) -> None:
+    recording = recorded(STATION, 91, mean=mean)
+    angles = recording.angles["vane"]
+    # The reading runs away and back by half a turn, again and again.
+    wrong = np.pi * np.sin(np.arange(angles.angle.size) * 0.02) ** 8
+    wrapped = np.angle(np.exp(1j * (angles.angle + wrong)))
+    found = diagnose(
+        replace(recording, angles={"vane": Angles(angles.time, wrapped)}), baseline()
+    )
+    assert found.verdict == verdict
+    assert not found.findings
+    assert ("calibrations do not reach" in found.unexplained.description) is (mean < 2.0)

@@ -55,6 +55,10 @@ FURTHER_EXACT_SHARE = 0.05
 LARGEST_EXACT_INEXACTNESS = 150.0
 """The same beside effects whose form is certain."""
 
+ALIKE = 0.05
+"""Further effects act in a kind of comparison (series, statistics, activity of a channel) with
+this share of all that they change, in squares."""
+
 TRACE = 0.01
 """An effect acts where it changes a signal by more than this share of its largest change."""
 
@@ -194,10 +198,8 @@ def gained_alike(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) 
     part = searcher.comparison.part_of_each
     gained = np.bincount(part, nothing**2 - before**2)
     changed = np.bincount(part, (after - before) ** 2)
-    total_change = float(changed.sum())
-    if total_change <= 0.0:
-        return float(np.maximum(gained, 0.0).sum())
-    return float(np.maximum(gained, 0.0) @ changed) / total_change
+    alike = changed >= ALIKE * changed.sum()
+    return float(np.maximum(gained[alike], 0.0).sum())
 
 
 def overlap(searcher: Searcher, fewer: Fit, more: Fit) -> float:

@@ -267,10 +267,8 @@ def diagnose(
     located_p = bank.p_value(max(f.score for f in before))
     excess = _noise_left(naming, baseline)
     verdict = verdict_of(naming, equal, remainder, detectable, located_p, excess)
-    calm = is_too_calm(comparison, baseline) and verdict != "none" and (
-        not naming.fit.terms or need_calibration(naming.fit.terms)
-    )
-    if calm:
+    calm = is_too_calm(comparison, baseline)
+    if calm and verdict != "none" and need_calibration(naming.fit.terms):
         verdict = "inconclusive"
     report("proving")(0.2)
     findings = findings_of(naming, equal, before, bank, baseline, with_proof) if verdict in {
@@ -281,6 +279,8 @@ def diagnose(
     verdict, findings, objection = _upheld(
         verdict, findings, naming, comparison, baseline.station, structured
     )
+    if calm and verdict == "unknown":
+        verdict = "inconclusive"
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)
@@ -291,7 +291,7 @@ def diagnose(
         description = _description(after[0])
     if verdict == "unknown" and is_noisy(naming, excess):
         description = f"{description}; {described(excess)}"
-    if calm:
+    if calm and verdict == "inconclusive":
         description = too_calm(baseline)
     if objection:
         description = f"{description}; {objection}" if description else objection
