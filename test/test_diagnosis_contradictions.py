@@ -13,8 +13,8 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import Judged, Naming, evidence, no_terms
 from wind_sensors.diagnosis.fitting import ALWAYS, Interval, Term, fit
+from wind_sensors.diagnosis.leading import held_throughout
 from wind_sensors.diagnosis.moves import looked_around
-from wind_sensors.diagnosis.naming import held_throughout
 from wind_sensors.diagnosis.noise_level import Excess
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.search import Searcher, searcher_of

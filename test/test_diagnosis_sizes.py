@@ -24,9 +24,9 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explanation import Judged, Naming, no_terms
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.guesses import guesses_of
+from wind_sensors.diagnosis.leading import explaining_what_stands_out, leading_alone
 from wind_sensors.diagnosis.learning import default_baseline
 from wind_sensors.diagnosis.moments import is_its_moment
-from wind_sensors.diagnosis.naming import explaining_what_stands_out, leading_alone
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.screening import scores_of
 from wind_sensors.diagnosis.search import Searcher, searcher_of
