@@ -263,7 +263,8 @@ def _icing(entry: Entry, values: Values) -> dict[str, Any]:
 
 ICING = Effect(
     name="icing",
-    meaning="Ice makes the rotor heavier and its cups or blades worse, at the same time.",
+    meaning="Ice (above freezing dirt, salt or insects) makes the rotor heavier and its cups or "
+    "blades worse, at the same time.",
     entrance="response",
     equation="l S = gain * U - U0 and l0 = factor * l0_cal together",
     source="K94, eq. (6)",
