@@ -15,6 +15,7 @@ from test_diagnosis_naming import STATION, baseline, recorded
 from wind_sensors.diagnosis.comparison import BANDS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.fitting import Term, planted
 from wind_sensors.diagnosis.observation import Grid, rate_series
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.raw_statistics.changes import change_statistics
@@ -183,3 +184,23 @@ def test_what_one_effect_contains_is_not_named_beside_it() -> None:
     ).findings
     assert finding.term.key == ("damaged_cup", "cup")
     assert finding.parameters["gain"].value == pytest.approx(0.92, abs=0.02)
+
+
+def test_which_pulses_chance_hits_moves_no_series() -> None:
+    bounce = Term(
+        catalogue()["extra_pulses"], "cup", {"bounce_probability": 0.05, "bounce_delay": 0.0005}
+    )
+    comparison = prepare(recorded(STATION, 62))
+
+    def rate(gain: float) -> np.ndarray:
+        slower = Term(catalogue()["calibration_drift"], "cup", {"gain": gain})
+        return comparison.simulate(planted(STATION, [bounce, slower])).series["cup/rotor_rate"]
+
+    # A thousandth of gain changes when pulses come, and so by chance which of them bounce.
+    moved = rate(1.0) - rate(0.999)
+    assert np.mean(moved) == pytest.approx(0.001 * np.mean(rate(1.0)), rel=0.2)
+    pulses, _ = comparison.signals(planted(STATION, [bounce]))
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    drawn = rate_series(pulses["cup"], cup, comparison.grid) - rate(1.0)
+    assert np.std(moved) < 0.5 * np.std(drawn)

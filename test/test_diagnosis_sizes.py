@@ -241,6 +241,19 @@ def test_effects_that_take_each_other_back_explain_nothing(gain: float, opposed:
     assert undo_each_other(naming, STATION) is opposed
 
 
+def test_bounces_that_are_seen_may_make_up_for_a_slow_rotor() -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 72)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    bounce = {"bounce_probability": 0.06, "bounce_delay": 0.0005}
+    terms = [
+        Term(catalogue()["extra_pulses"], "cup", bounce),
+        Term(catalogue()["calibration_drift"], "cup", {"gain": 0.94}),
+    ]
+    both = fit(null, STATION, terms, None, iterations=0)
+    naming = Naming(both, null, null, null.of(searcher.bank.without), 0.0)
+    assert not undo_each_other(naming, STATION)
+
+
 @pytest.mark.parametrize(
     ("planted", "values", "growing"),
     [("timestamp_latency", {"latency": 0.5}, False), ("clock_drift", {"drift": 2500.0}, True)],

@@ -19,6 +19,7 @@ from wind_sensors.simulation import (
     RotorResponse,
     angle_readings,
     edge_times,
+    expected_signals,
     random_numbers,
     respond,
 )
@@ -191,6 +192,25 @@ def test_lost_edges_are_the_stated_share_and_the_others_stay():
     assert not np.array_equal(
         kept, edge_times(steadily_turning(rotor, seconds=600.0), "cup", seed=4)
     )
+
+
+@pytest.mark.parametrize(
+    ("electronics", "counts"),
+    [
+        (Electronics(loss_probability=0.3), 0.7),
+        (Electronics(bounce_probability=0.2, bounce_delay=0.002), 1.2),
+        (Electronics(bounce_probability=0.2, bounce_delay=0.002, dead_time=0.01), 1.0),
+    ],
+)
+def test_on_average_each_edge_counts_for_what_chance_makes_of_it(electronics, counts):
+    every = edge_times(steadily_turning(cup(), seconds=300.0), "cup")
+    response = steadily_turning(cup(electronics=electronics), seconds=300.0)
+    expected = expected_signals(response, "cup")
+    np.testing.assert_array_equal(expected.time, every)
+    slots = cup().pulses_per_revolution
+    np.testing.assert_allclose(np.diff(expected.turns), counts / slots, rtol=1e-6)
+    drawn = len(edge_times(response, "cup", seed=3)) / len(every)
+    assert drawn == pytest.approx(counts, abs=0.03)
 
 
 def test_bounces_follow_their_edges_and_dead_time_removes_them():

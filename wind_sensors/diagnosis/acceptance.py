@@ -56,7 +56,7 @@ LARGEST_EXACT_INEXACTNESS = 150.0
 """The same beside effects whose form is certain."""
 
 ALIKE = 0.05
-"""Further effects act in a kind of comparison (series, statistics, activity of a channel) with
+"""Further effects act in a part of what is compared (series, bands, statistics, activity) with
 this share of all that they change, in squares."""
 
 TRACE = 0.01

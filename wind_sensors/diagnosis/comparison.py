@@ -38,9 +38,11 @@ from wind_sensors.motion.frames import wrap
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.memory import DriveMemory, Memory
-from wind_sensors.simulation.pulses import rotor_signals
+from wind_sensors.simulation.pulses import expected_signals, rotor_signals
 from wind_sensors.simulation.response import Response, respond
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
+from wind_sensors.station.changes import segments
+from wind_sensors.station.inputs import resolved
 from wind_sensors.station.model import Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording, erratic
 
@@ -279,8 +281,25 @@ class Comparison:
         key = repr((instrument, parts, station.platform, station.sensor_heading_deg, changes))
         alone = station.model_copy(update={"changes": changes})
         return self._simulated.of(
-            key, lambda: self.observe(*self.signals(alone, (instrument,)))
+            key,
+            lambda: self.observe(
+                *self.signals(alone, (instrument,)), self._expected_pulses(alone, instrument)
+            ),
         )
+
+    def _expected_pulses(self, station: Station, instrument: str) -> dict[str, Pulses]:
+        """What a rotor whose pulses are lost or bounce by chance records on average."""
+        rotors = [
+            entry
+            for part in segments(station)
+            if isinstance(entry := part.station.instrument(instrument), Rotor)
+            and resolved(entry.pulses, "pulses").meaning != "angle"
+        ]
+        electronics = [rotor.electronics for rotor in rotors]
+        if not any(e.bounce_probability > 0.0 or e.loss_probability > 0.0 for e in electronics):
+            return {}
+        response = self.respond(station, (instrument,))
+        return {instrument: expected_signals(response, instrument)}
 
     def _reaching(self, station: Station, instrument: str) -> tuple[str, ...]:
         """Instruments on which the signals of one depend: itself and what carries it."""
@@ -289,8 +308,21 @@ class Comparison:
             return instrument, own.mounted_on
         return (instrument,)
 
-    def observe(self, pulses: Mapping[str, Pulses], angles: Mapping[str, Angles]) -> Simulated:
-        """Series and statistics of pulses and readings; of those channels that have any."""
+    def observe(
+        self,
+        pulses: Mapping[str, Pulses],
+        angles: Mapping[str, Angles],
+        expected_pulses: Mapping[str, Pulses] | None = None,
+    ) -> Simulated:
+        """Series and statistics of pulses and readings; of those channels that have any.
+
+        Args:
+            pulses: Of rotors.
+            angles: Of vanes.
+            expected_pulses: For the series alone, where chance took part in `pulses`: which of
+                them it hit says nothing, and would hide what moves the series by as little.
+        """
+        on_average = {} if expected_pulses is None else expected_pulses
         cosine: dict[str, FloatArray] = {}
         series: dict[str, FloatArray] = {}
         statistics: dict[str, FloatArray] = {}
@@ -303,6 +335,7 @@ class Comparison:
                 rotor = self.station.instrument(channel.instrument)
                 assert isinstance(rotor, Rotor)
                 values = rate_series(pulses[channel.instrument], rotor, self.grid)
+                drawn = values
                 intervals = interval_statistics(
                     pulses[channel.instrument],
                     rotor,
@@ -311,10 +344,12 @@ class Comparison:
                     self.grid,
                     self.mask,
                 )
-                full = spectra.to_cosine(self.masked(values - np.mean(values)))
-                full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
+                full = self._cosine(drawn)
                 bands = self._log_spectrum(full, self.grid.dt, channel, 2.2)
-                changes = change_statistics(values, self.speed, self.mask)
+                changes = change_statistics(drawn, self.speed, self.mask)
+                if channel.instrument in on_average:
+                    values = rate_series(on_average[channel.instrument], rotor, self.grid)
+                    full = self._cosine(values)
                 statistics[channel.name] = np.concatenate((bands, intervals, changes))
             else:
                 readings = angles[channel.instrument]
@@ -322,7 +357,7 @@ class Comparison:
                 deviation = self._nearest_turn(
                     channel, angle_series(readings, self.direction, self.grid, expected)
                 )
-                values = deviation * self.speed
+                values = drawn = deviation * self.speed
                 full = spectra.to_cosine(self.masked(values))
                 statistics[channel.name] = np.concatenate(
                     (
@@ -340,8 +375,14 @@ class Comparison:
                 )
             series[channel.name] = values
             cosine[channel.name] = full[: self.coefficients]
-            levels[channel.name] = activity.levels(values, channel, mean_speed, self.grid)
+            levels[channel.name] = activity.levels(drawn, channel, mean_speed, self.grid)
         return Simulated(cosine, series, statistics, levels, self.unseen.counted)
+
+    def _cosine(self, values: FloatArray) -> FloatArray:
+        """Cosine coefficients of a rate, the slowest from its mean."""
+        full = spectra.to_cosine(self.masked(values - np.mean(values)))
+        full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
+        return full
 
     def _nearest_turn(
         self, channel: Channel, deviation: FloatArray, time: FloatArray | None = None
@@ -451,13 +492,18 @@ class Comparison:
 
     @property
     def part_of_each(self) -> npt.NDArray[np.int_]:
-        """Number of the part (series, statistics, activity of each channel) of each, shape (l,)."""
-        kinds = np.zeros(self.channel_of_each.size, dtype=np.int_)
-        statistics = len(self.channels) * self.coefficients
+        """Number of the part to which each of what is compared belongs, shape (l,).
+
+        Parts are series, spectral bands, statistics of raw signals and activity of each channel.
+        """
+        statistics = [
+            np.where(np.arange(self.measured.statistics[c.name].size) < BANDS, 1, 2)
+            for c in self.channels
+        ]
         activities = sum(self.measured.levels[c.name].size for c in self.channels)
-        kinds[statistics:] = 1
-        kinds[kinds.size - activities :] = 2
-        return self.channel_of_each + len(self.channels) * kinds
+        series = np.zeros(self.coefficients * len(self.channels), dtype=np.int_)
+        kinds = np.concatenate((series, *statistics, np.full(activities, 3)))
+        return np.asarray(self.channel_of_each + len(self.channels) * kinds)
 
     def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
         """How far `vector` falls when what is compared rises by one, shape (l,)."""

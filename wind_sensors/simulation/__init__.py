@@ -2,7 +2,12 @@
 
 from wind_sensors.simulation.drive import Drive, air_density, drive_from_recording
 from wind_sensors.simulation.encoder import AngleEncoder, angle_readings
-from wind_sensors.simulation.pulses import PulseCircuit, edge_times, rotor_signals
+from wind_sensors.simulation.pulses import (
+    PulseCircuit,
+    edge_times,
+    expected_signals,
+    rotor_signals,
+)
 from wind_sensors.simulation.response import (
     AngleResponse,
     Response,
@@ -31,6 +36,7 @@ __all__ = [
     "angle_readings",
     "drive_from_recording",
     "edge_times",
+    "expected_signals",
     "respond",
     "rotor_signals",
     "simulate",

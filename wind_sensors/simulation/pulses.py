@@ -208,6 +208,23 @@ class PulseCircuit:
             turns.append(numbers[kept] / now.pulses_per_revolution)
         return Pulses(np.concatenate(time), np.concatenate(turns))
 
+    def expected(self, response: Response) -> Pulses:
+        """What the logger records on average: every edge, for as many as chance makes of it."""
+        time, weights = [], []
+        for rotor, times, numbers, end in self._passed(response):
+            electronics = rotor.electronics
+            sure = {"bounce_probability": 0.0, "loss_probability": 0.0}
+            certain = rotor.model_copy(
+                update={"electronics": electronics.model_copy(update=sure)}
+            )
+            part = self._recorded(certain, times, numbers, end)
+            heard = electronics.bounce_delay >= electronics.dead_time
+            bounces = electronics.bounce_probability if heard else 0.0
+            time.append(part)
+            counts = (1.0 - electronics.loss_probability + bounces) / rotor.pulses_per_revolution
+            weights.append(np.full(part.size, counts))
+        return Pulses(np.concatenate(time), np.cumsum(np.concatenate(weights)))
+
     def _passed(
         self, response: Response
     ) -> list[tuple[Rotor, TimeArray, npt.NDArray[np.int64], int]]:
@@ -279,6 +296,11 @@ def edge_times(response: Response, name: str, seed: int = 0) -> TimeArray:
 def rotor_signals(response: Response, name: str, seed: int = 0) -> Pulses:
     """`PulseCircuit.signals` of one rotor in a response that begins a recording's interval."""
     return PulseCircuit(name, _origin(response), seed).signals(response)
+
+
+def expected_signals(response: Response, name: str) -> Pulses:
+    """`PulseCircuit.expected` of one rotor in a response that begins a recording's interval."""
+    return PulseCircuit(name, _origin(response), 0).expected(response)
 
 
 def _origin(response: Response) -> int:
