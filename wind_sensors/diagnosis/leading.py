@@ -92,6 +92,7 @@ def explaining_what_stands_out(
     whitener: Whitener,
     current: Fit,
     enough: list[tuple[float, Judged]],
+    near: float = 2.0 * EQUAL_LIKELIHOOD,
 ) -> list[tuple[float, Judged]]:
     """Of explanations that bring as much as the best, those of the region that stands out.
 
@@ -100,10 +101,11 @@ def explaining_what_stands_out(
         whitener: The null of the terms so far.
         current: The terms so far.
         enough: What each brings, and the explanation.
+        near: What brings less than the best by no more than this brings as much.
     """
     most = max(brings for brings, _ in enough)
-    near = [pair for pair in enough if pair[0] > most - 2.0 * EQUAL_LIKELIHOOD]
-    if len({one.fit.terms[-1].key for _, one in near}) < 2:
+    rivals = [pair for pair in enough if pair[0] > most - near]
+    if len({one.fit.terms[-1].key for _, one in rivals}) < 2:
         return enough
     bank = region_bank(whitener, searcher.bank.without)
     before = bank.scores(current.vector)
@@ -114,14 +116,15 @@ def explaining_what_stands_out(
     def left(one: Judged) -> float:
         return float(bank.scores(whitener.of(one.fit.simulated))[strongest])
 
-    explaining = [p for p in near if left(p[1]) < EXPLAINED * float(before[strongest])]
+    explaining = [p for p in rivals if left(p[1]) < EXPLAINED * float(before[strongest])]
     return explaining or enough
 
 
 def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
     """The single effect that is left of two, or the one that led before the second came.
 
-    The first explains what stands out; only one that brings clearly more takes its place.
+    Where the first explains what stands out and the other does not, only one that brings clearly
+    more takes its place.
 
     Args:
         searcher: The search.
@@ -137,7 +140,7 @@ def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
     rivals = [
         (brought(searcher, one, nothing, so_far), one) for one in judged(searcher, [left, first])
     ]
-    rivals = explaining_what_stands_out(searcher, whitener, nothing, rivals)
+    rivals = explaining_what_stands_out(searcher, whitener, nothing, rivals, CLEARLY_BETTER)
     return max(rivals, key=lambda rival: rival[0])[1].fit
 
 
