@@ -15,10 +15,10 @@ SHOWN_P = 0.05
 LEAST_REMOVED = 0.7
 """Share of the excess misfit that held-out blocks must lose to what is named."""
 
-LEAST_DRAWN_REMOVED = 0.5
+LEAST_NOISY_REMOVED = 0.5
 NOISE_LEFT = 1.1
-"""The same where an effect is drawn at random, and so another one in other blocks, if it leaves no
-more than so many times the noise of a healthy day."""
+"""The same where an effect comes with noise of its own, which is another one in other blocks, if no
+more is left than so many times the noise of a healthy day."""
 
 MOST_SHARED = 1.5
 """Largest sum of what two effects on the same signals bring, each in the other's presence, over
@@ -88,8 +88,8 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     proof = next((f.proof for f in findings if f.proof is not None), None)
     if proof is None or proof.excess_removed > LEAST_REMOVED:
         return True
-    drawn = any(f.term.effect.noisy for f in findings)
-    if drawn and proof.after < NOISE_LEFT and proof.excess_removed > LEAST_DRAWN_REMOVED:
+    noisy = any(f.term.effect.noisy for f in findings)
+    if noisy and proof.after < NOISE_LEFT and proof.excess_removed > LEAST_NOISY_REMOVED:
         return True
     seldom = any(f.term.interval != ALWAYS or f.term.effect.occasional for f in findings)
     rival = -math.inf if proof.placebo_removed is None else proof.placebo_removed
