@@ -10,10 +10,10 @@ import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.baseline import ChannelBaseline
-from wind_sensors.diagnosis.comparison import BANDS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observing import BANDS
 from wind_sensors.diagnosis.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.report.diagnosis_figures import activity_figure, statistics_figure

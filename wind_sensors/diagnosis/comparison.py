@@ -8,7 +8,7 @@ whitened differences, measured minus simulated, in which a healthy station gives
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,25 +16,11 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
-from wind_sensors.diagnosis.observation import (
-    LOWEST_BAND_FREQUENCY,
-    NORMALISED_BANDS,
-    Channel,
-    Grid,
-    angle_series,
-    rate_series,
-)
-from wind_sensors.diagnosis.raw_statistics.changes import change_statistics
-from wind_sensors.diagnosis.raw_statistics.pulses import interval_statistics
-from wind_sensors.diagnosis.raw_statistics.vanes import (
-    erratic_statistics,
-    step_statistics,
-    stillness_statistics,
-)
+from wind_sensors.diagnosis.observation import Channel, Grid
+from wind_sensors.diagnosis.observing import BANDS, Simulated, View
 from wind_sensors.diagnosis.reference_place import Place, delayed
 from wind_sensors.diagnosis.turning import where_vanes_follow
 from wind_sensors.errors import UserError
-from wind_sensors.motion.frames import wrap
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.memory import DriveMemory, Memory
@@ -44,12 +30,9 @@ from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.changes import segments
 from wind_sensors.station.inputs import resolved
 from wind_sensors.station.model import Propeller, Rotor, Station
-from wind_sensors.station.signals import Angles, Pulses, Recording, erratic
+from wind_sensors.station.signals import Angles, Pulses, Recording
 
 FloatArray = npt.NDArray[np.float64]
-
-HIGHEST_FREQUENCY = 1.25
-"""Residual series are compared below this frequency [Hz]; above, only spectra are."""
 
 LOW_END = 0.02
 """Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
@@ -59,51 +42,6 @@ FASTEST = 60.0
 
 SIMULATIONS = 64
 """So many simulated channels are kept: a station that is tried again is not simulated again."""
-
-BANDS = len(NORMALISED_BANDS) - 1
-
-
-@dataclass(frozen=True)
-class Simulated:
-    """Series and statistics of the signals of one station, simulated or measured.
-
-    Attributes:
-        cosine: Cosine coefficients of each channel's series up to `HIGHEST_FREQUENCY`, by name.
-        series: The series, by channel name: m/s for a rotor, lateral m/s for a vane.
-        statistics: By channel name: log spectra in the normalised bands (nan: band not seen),
-            followed by what `STATISTICS` lists for its kind.
-        levels: By channel name: logarithm of the power of quick eddies in each segment, shape
-            (bands, segments).
-        counted: Segments that count, shape (segments,).
-    """
-
-    cosine: dict[str, FloatArray]
-    series: dict[str, FloatArray]
-    statistics: dict[str, FloatArray]
-    levels: dict[str, FloatArray]
-    counted: npt.NDArray[np.bool_]
-
-    def with_others(self, others: Simulated) -> Simulated:
-        """The same with channels taken from another."""
-        return Simulated(
-            {**self.cosine, **others.cosine},
-            {**self.series, **others.series},
-            {**self.statistics, **others.statistics},
-            {**self.levels, **others.levels},
-            self.counted,
-        )
-
-    def activity(self, channel: str) -> FloatArray:
-        """Levels of a channel beyond their mean over the segments that count, flat."""
-        return activity.contrasts(self.levels[channel], self.counted).ravel()
-
-    def flat(self, channels: Sequence[Channel]) -> FloatArray:
-        """What is compared: coefficients of all channels, all statistics, all activities, (l,)."""
-        return np.concatenate(
-            [self.cosine[c.name] for c in channels]
-            + [self.statistics[c.name] for c in channels]
-            + [self.activity(c.name) for c in channels]
-        )
 
 
 @dataclass(frozen=True)
@@ -166,6 +104,21 @@ class Comparison:
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
     )
 
+    @property
+    def view(self) -> View:
+        """How the recording and its simulations are looked at."""
+        return View(
+            self.station,
+            self.grid,
+            self.channels,
+            self.direction,
+            self.speed,
+            self.wind_from,
+            self.mask,
+            self.expected,
+            self.departure,
+        )
+
     def within(self, mask: FloatArray) -> Comparison:
         """The same comparison in the blocks of a mask only, shape (n,)."""
         masked = replace(self, mask=self.masked(mask))
@@ -209,7 +162,7 @@ class Comparison:
     @property
     def coefficients(self) -> int:
         """Number of cosine coefficients compared in each channel."""
-        return min(self.grid.n, int(2.0 * self.grid.n * self.grid.dt * HIGHEST_FREQUENCY))
+        return self.view.coefficients
 
     def respond(self, station: Station, only: Collection[str] = ()) -> Response:
         """The station's instruments in this recording's wind."""
@@ -314,126 +267,12 @@ class Comparison:
         angles: Mapping[str, Angles],
         expected_pulses: Mapping[str, Pulses] | None = None,
     ) -> Simulated:
-        """Series and statistics of pulses and readings; of those channels that have any.
-
-        Args:
-            pulses: Of rotors.
-            angles: Of vanes.
-            expected_pulses: For the series alone, where chance took part in `pulses`: which of
-                them it hit says nothing, and would hide what moves the series by as little.
-        """
-        on_average = {} if expected_pulses is None else expected_pulses
-        cosine: dict[str, FloatArray] = {}
-        series: dict[str, FloatArray] = {}
-        statistics: dict[str, FloatArray] = {}
-        levels: dict[str, FloatArray] = {}
-        mean_speed = float(np.mean(self.speed))
-        for channel in self.channels:
-            if channel.instrument not in (pulses if channel.kind == "rotor_rate" else angles):
-                continue
-            if channel.kind == "rotor_rate":
-                rotor = self.station.instrument(channel.instrument)
-                assert isinstance(rotor, Rotor)
-                values = rate_series(pulses[channel.instrument], rotor, self.grid)
-                drawn = values
-                intervals = interval_statistics(
-                    pulses[channel.instrument],
-                    rotor,
-                    self.wind_from,
-                    self.speed,
-                    self.grid,
-                    self.mask,
-                )
-                full = self._cosine(drawn)
-                bands = self._log_spectrum(full, self.grid.dt, channel, 2.2)
-                changes = change_statistics(drawn, self.speed, self.mask)
-                if channel.instrument in on_average:
-                    values = rate_series(on_average[channel.instrument], rotor, self.grid)
-                    full = self._cosine(values)
-                statistics[channel.name] = np.concatenate((bands, intervals, changes))
-            else:
-                readings = angles[channel.instrument]
-                expected = self.expected.get(channel.name)
-                deviation = self._nearest_turn(
-                    channel, angle_series(readings, self.direction, self.grid, expected)
-                )
-                values = drawn = deviation * self.speed
-                full = spectra.to_cosine(self.masked(values))
-                statistics[channel.name] = np.concatenate(
-                    (
-                        self._vane_spectrum(readings, channel),
-                        stillness_statistics(
-                            deviation + self.direction,
-                            self.expected.get(channel.name, deviation) + self.direction,
-                            self.speed,
-                            self.mask,
-                        ),
-                        erratic_statistics(readings, self.direction, self.grid, self.mask),
-                        step_statistics(readings, self.grid, self.mask),
-                        change_statistics(deviation + self.direction, self.speed, self.mask),
-                    )
-                )
-            series[channel.name] = values
-            cosine[channel.name] = full[: self.coefficients]
-            levels[channel.name] = activity.levels(drawn, channel, mean_speed, self.grid)
-        return Simulated(cosine, series, statistics, levels, self.unseen.counted)
-
-    def _cosine(self, values: FloatArray) -> FloatArray:
-        """Cosine coefficients of a rate, the slowest from its mean."""
-        full = spectra.to_cosine(self.masked(values - np.mean(values)))
-        full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
-        return full
-
-    def _nearest_turn(
-        self, channel: Channel, deviation: FloatArray, time: FloatArray | None = None
-    ) -> FloatArray:
-        """Deviations of a vane moved by whole turns to where they are expected."""
-        expected = self.expected.get(channel.name)
-        if expected is None:
-            return deviation
-        expected = expected + self.departure.get(channel.name, 0.0)
-        if time is not None:
-            expected = np.interp(time, self.grid.centres, expected)
-        turns = np.rint((deviation - expected) / (2.0 * np.pi))
-        return np.asarray(deviation - 2.0 * np.pi * turns, dtype=np.float64)
+        """Series and statistics of pulses and readings, as `View.observe` gives them."""
+        return self.unseen.with_others(self.view.observe(pulses, angles, expected_pulses))
 
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""
-        return values if self.mask is None else values * self.mask
-
-    def _vane_spectrum(self, readings: Angles, channel: Channel) -> FloatArray:
-        time = self.grid.seconds(readings.time)
-        if time.size < 16:
-            return np.full(BANDS, np.nan)
-        dt = float(np.median(np.diff(time)))
-        around = np.interp(time, self.grid.centres, self.direction)
-        deviation = wrap(readings.angle - around)
-        good = np.isfinite(deviation) & ~erratic(readings)
-        if not good.any():
-            return np.full(BANDS, np.nan)
-        if not good.all():
-            deviation = np.interp(time, time[good], deviation[good])
-        deviation = self._nearest_turn(channel, deviation, time)
-        weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
-        return self._log_spectrum(
-            spectra.to_cosine(np.asarray(weighted)), dt, channel, 0.4 / dt
-        )
-
-    def _log_spectrum(
-        self, coefficients: FloatArray, dt: float, channel: Channel, highest: float
-    ) -> FloatArray:
-        """Log mean square of the coefficients in the normalised bands."""
-        mean_speed = float(np.mean(self.speed))
-        frequency = spectra.cosine_frequencies(coefficients.size, dt)
-        edges = NORMALISED_BANDS * mean_speed / (2.0 * np.pi * channel.length)
-        out = np.full(BANDS, np.nan)
-        power = coefficients * coefficients
-        for k in range(BANDS):
-            low, high = max(edges[k], LOWEST_BAND_FREQUENCY), min(edges[k + 1], highest)
-            inside = (frequency >= low) & (frequency < high)
-            if high > 1.1 * low and np.count_nonzero(inside) >= 20:
-                out[k] = np.log(np.mean(power[inside]) + 1e-12)
-        return out
+        return self.view.masked(values)
 
     def coherence(self, simulated: Simulated, channel: Channel) -> spectra.Coherence:
         """Coherence of measured and simulated series, a vane's with its slow turning included."""

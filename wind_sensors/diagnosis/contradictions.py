@@ -7,10 +7,10 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import Naming
 from wind_sensors.diagnosis.fitting import Term, planted
 from wind_sensors.diagnosis.intervals import cell_signatures, window_of
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.whitening import in_series
 from wind_sensors.station.model import Station
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.acceptance import passing_gain
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import EQUAL_SHARE, Alternative, Naming
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, planted
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, strongest
 

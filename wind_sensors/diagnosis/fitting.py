@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.whitening import Whitener
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Station

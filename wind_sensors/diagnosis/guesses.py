@@ -8,13 +8,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
-from wind_sensors.diagnosis.comparison import BANDS, Comparison
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import dead_log
 from wind_sensors.diagnosis.fitting import Interval, Term
 from wind_sensors.diagnosis.intervals import interval_of
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observing import BANDS
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import BoolArray, erratic
 

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.comparison import Comparison, Trust
 from wind_sensors.diagnosis.fitting import ROUGHLY, Term, fit, planted
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.whitening import Whitener
 from wind_sensors.station.model import Station
 

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity, spectra
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.comparison import Comparison, Trust
 from wind_sensors.diagnosis.fitting import Interval
+from wind_sensors.diagnosis.observing import Simulated
 
 FloatArray = npt.NDArray[np.float64]
 

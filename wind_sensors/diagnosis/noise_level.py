@@ -16,8 +16,9 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import spectra
 from wind_sensors.diagnosis.baseline import WAVENUMBERS, Baseline, ChannelBaseline
-from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.whitening import residual_of
 
 FloatArray = npt.NDArray[np.float64]

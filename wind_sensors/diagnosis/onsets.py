@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.acceptance import plausible
-from wind_sensors.diagnosis.comparison import Simulated
 from wind_sensors.diagnosis.explanation import seen_in, total
 from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit, planted
 from wind_sensors.diagnosis.intervals import (
@@ -18,6 +17,7 @@ from wind_sensors.diagnosis.intervals import (
     interval_gains,
     interval_of,
 )
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,
     Key,

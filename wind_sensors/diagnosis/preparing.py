@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.activity import counted_segments, segments_of
-from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.counted_time import where_reference_is
 from wind_sensors.diagnosis.observation import (
     SERIES_INTERVAL,
@@ -19,6 +19,7 @@ from wind_sensors.diagnosis.observation import (
     channels_of,
     rate_series,
 )
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.reference_place import Place, delayed
 from wind_sensors.diagnosis.turning import slow_departure, where_vanes_follow
 from wind_sensors.errors import UserError

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.effects.definition import STATION
 from wind_sensors.diagnosis.fitting import Term
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.reference_place import Place
 from wind_sensors.diagnosis.signatures import Template
 from wind_sensors.station.model import Station

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity, spectra
-from wind_sensors.diagnosis.comparison import BANDS, LOW_END, Comparison, Simulated
+from wind_sensors.diagnosis.comparison import LOW_END, Comparison
 from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.observing import BANDS, Simulated
 from wind_sensors.diagnosis.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.whitening import Whitener
 

@@ -11,10 +11,11 @@ from scipy.linalg import block_diag
 
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import calm_share
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.comparison import Comparison, Trust
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.guesses import BLIND_EFFECTS
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.reference_lag import lag_weights, misplaced
 from wind_sensors.diagnosis.screening import (
     JOINT_TEMPLATES,

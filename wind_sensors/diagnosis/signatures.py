@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.comparison import Comparison, Trust
 from wind_sensors.diagnosis.effects.definition import (
     PLATFORM,
     STATION,
@@ -20,6 +20,7 @@ from wind_sensors.diagnosis.effects.definition import (
     with_effect,
 )
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.calibrated_range import is_calm, is_too_calm, need_calibration, too_calm
-from wind_sensors.diagnosis.comparison import Comparison, Simulated
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.contradictions import (
     is_discordant,
     is_uneven,
@@ -36,6 +36,7 @@ from wind_sensors.diagnosis.fitting import ALWAYS, planted
 from wind_sensors.diagnosis.guesses import guesses_of
 from wind_sensors.diagnosis.naming import name
 from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.screening import group_templates

@@ -11,13 +11,9 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline
-from wind_sensors.diagnosis.comparison import (
-    LOW_END,
-    Comparison,
-    Simulated,
-    Trust,
-)
+from wind_sensors.diagnosis.comparison import LOW_END, Comparison, Trust
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import ChannelBaseline
-from wind_sensors.diagnosis.comparison import BANDS, Comparison, Simulated
+from wind_sensors.diagnosis.comparison import Comparison
 from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.observing import BANDS, Simulated
 from wind_sensors.diagnosis.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.regions import eddies
 from wind_sensors.report import style
@@ -197,7 +198,9 @@ def statistics_figure(
         axes.set_title(f"Raw signals, {channel_words(channel.name)}")
         axes.set_xlabel("recorded minus simulated, in standard deviations of healthy days")
         if corrected is not None:
-            axes.legend(loc="best", ncols=2)
+            axes.legend(
+                loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=2
+            )
     return made
 
 

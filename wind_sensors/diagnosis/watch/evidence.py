@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.comparison import Comparison, Trust
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.learning import STANDING_TOLERANCES
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.signatures import Template
 
 FloatArray = npt.NDArray[np.float64]

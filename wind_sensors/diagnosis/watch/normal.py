@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis import activity, spectra
 from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline, station_deviation
-from wind_sensors.diagnosis.comparison import Comparison, Simulated, Trust
+from wind_sensors.diagnosis.comparison import Comparison, Trust
 from wind_sensors.diagnosis.observation import Channel
+from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.whitening import SMALLEST_DEVIATION
 
 FloatArray = npt.NDArray[np.float64]
