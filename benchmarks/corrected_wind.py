@@ -24,9 +24,9 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.fitting import planted
-from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.explaining.fitting import planted
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.estimation import EstimatorSettings, Method, process
 from wind_sensors.estimation.scoring import agreement

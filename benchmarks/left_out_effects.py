@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.learning import learn
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.signatures import Template, signature_bank, templates_of
+from wind_sensors.diagnosis.explaining.signatures import Template, signature_bank, templates_of
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.recordings import read_recording
 from wind_sensors.recordings.station_files import load_station

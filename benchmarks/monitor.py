@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.watch import Watch, WatchSettings
 from wind_sensors.diagnosis.watch.finding import Finding
 from wind_sensors.diagnosis.watch.naming import Candidate

@@ -11,9 +11,9 @@ import sys
 import time
 from pathlib import Path
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.findings import Finding
-from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
+from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.recordings import read_recording
 

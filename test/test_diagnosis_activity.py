@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis import activity
+from wind_sensors.diagnosis.comparing import activity
+from wind_sensors.diagnosis.comparing.observation import Channel, Grid
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.fitting import Term, planted
-from wind_sensors.diagnosis.observation import Channel, Grid
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.search import searcher_of
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.search import searcher_of
 
 CUP = Channel("cup/rotor_rate", "cup", "rotor_rate", length=2.0)
 GRID = Grid(start=0, dt=0.2, n=4510)

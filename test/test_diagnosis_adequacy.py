@@ -9,25 +9,25 @@ import pytest
 from scipy.optimize import minimize
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.acceptance import (
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.acceptance import (
     PASSING_FORM_GAIN,
     PASSING_GAIN,
     is_plausible,
     passing_gain,
 )
-from wind_sensors.diagnosis.contradictions import is_uneven
-from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import judged
-from wind_sensors.diagnosis.findings import Estimate, Finding
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.explaining.explanation import judged
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.healthy.whitening import form_signatures, trust_of, unstanding
+from wind_sensors.diagnosis.proving.contradictions import is_uneven
+from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.diagnosis.proving.proof import Proof
+from wind_sensors.diagnosis.proving.support import borne_out, determined, made_up, passes_unseen
 from wind_sensors.diagnosis.regions import Found, Region
-from wind_sensors.diagnosis.search import searcher_of
-from wind_sensors.diagnosis.support import borne_out, determined, made_up, passes_unseen
 from wind_sensors.diagnosis.verdict import diagnose
-from wind_sensors.diagnosis.whitening import form_signatures, trust_of, unstanding
 from wind_sensors.errors import UserError
 from wind_sensors.motion import rotations
 from wind_sensors.motion.platform_track import Motion

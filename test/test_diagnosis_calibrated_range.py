@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.baseline import CALIBRATED_FROM, Baseline, default_channel
-from wind_sensors.diagnosis.calibrated_range import (
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, channels_of
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.healthy.baseline import CALIBRATED_FROM, Baseline, default_channel
+from wind_sensors.diagnosis.healthy.calibrated_range import (
     is_calm,
     is_too_calm,
     need_calibration,
     slowest_wind,
 )
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.fitting import Term
-from wind_sensors.diagnosis.learning import default_baseline, learn
-from wind_sensors.diagnosis.observation import NORMALISED_BANDS, channels_of
-from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation.run import simulate

@@ -7,18 +7,18 @@ from dataclasses import replace
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.contradictions import is_discordant, varies
-from wind_sensors.diagnosis.decision import Remainder, Verdict, verdict_of
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Judged, Naming, evidence, no_terms
-from wind_sensors.diagnosis.fitting import ALWAYS, Interval, Term, fit
-from wind_sensors.diagnosis.leading import held_throughout
-from wind_sensors.diagnosis.moves import looked_around
-from wind_sensors.diagnosis.noise_level import Excess
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.search import Searcher, searcher_of
-from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, evidence, no_terms
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, fit
+from wind_sensors.diagnosis.explaining.leading import held_throughout
+from wind_sensors.diagnosis.explaining.moves import looked_around
+from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.healthy.noise_level import Excess
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.proving.contradictions import is_discordant, varies
+from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
 
 
 def searched(

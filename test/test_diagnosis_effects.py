@@ -6,7 +6,7 @@ import pytest
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, entry_of, touched, with_effect
-from wind_sensors.diagnosis.signatures import entries
+from wind_sensors.diagnosis.explaining.signatures import entries
 from wind_sensors.station.model import Station
 
 IDENTIFIERS = {

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, fit, planted
-from wind_sensors.diagnosis.intervals import cell_signatures, interval_gains
-from wind_sensors.diagnosis.onsets import refined_interval
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.search import searcher_of
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.explaining.intervals import cell_signatures, interval_gains
+from wind_sensors.diagnosis.explaining.onsets import refined_interval
+from wind_sensors.diagnosis.explaining.search import searcher_of
 
 CELLS = 7
 LENGTH = 40

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, recorded
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.learning import default_baseline
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.reference_lag import lag_weights
-from wind_sensors.diagnosis.search import searcher_of
-from wind_sensors.diagnosis.signatures import Template, templates_of
-from wind_sensors.diagnosis.standing import Evidence, loudest_gains
+from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.signatures import Template, templates_of
+from wind_sensors.diagnosis.healthy.learning import default_baseline
+from wind_sensors.diagnosis.healthy.reference_lag import lag_weights
+from wind_sensors.diagnosis.healthy.standing import Evidence, loudest_gains
 
 QUIET, LOUD = 0.0, 60.0
 POWER = 100.0

@@ -11,13 +11,13 @@ import pytest
 from representatives import represented
 from scipy.signal import lfilter
 
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.guesses import guesses_of
+from wind_sensors.diagnosis.explaining.guesses import guesses_of
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.json_output import as_json
-from wind_sensors.diagnosis.learning import learn
-from wind_sensors.diagnosis.preparing import prepare
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.encoder import angle_readings

@@ -9,11 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wind_sensors.diagnosis.baseline import WAVENUMBERS, Baseline
-from wind_sensors.diagnosis.decision import NOISY
-from wind_sensors.diagnosis.learning import default_baseline, learn
-from wind_sensors.diagnosis.noise_level import EXPECTED_SCATTER, excess_of, learnt_levels, levels
-from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.healthy.baseline import WAVENUMBERS, Baseline
+from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
+from wind_sensors.diagnosis.healthy.noise_level import (
+    EXPECTED_SCATTER,
+    excess_of,
+    learnt_levels,
+    levels,
+)
+from wind_sensors.diagnosis.proving.decision import NOISY
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Input, Reference, Station

@@ -12,14 +12,17 @@ from representatives import represented
 from scipy.signal import lfilter
 from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparing.observation import Grid, rate_series
+from wind_sensors.diagnosis.comparing.observing import BANDS
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.comparing.raw_statistics.changes import change_statistics
+from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
+    step_statistics,
+    stillness_statistics,
+)
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.fitting import Term, planted
-from wind_sensors.diagnosis.observation import Grid, rate_series
-from wind_sensors.diagnosis.observing import BANDS
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.raw_statistics.changes import change_statistics
-from wind_sensors.diagnosis.raw_statistics.vanes import step_statistics, stillness_statistics
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Angles, Pulses, erratic

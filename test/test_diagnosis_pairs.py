@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.fitting import Term, fit, planted
-from wind_sensors.diagnosis.guesses import guesses_of
-from wind_sensors.diagnosis.moves import simplified
-from wind_sensors.diagnosis.pairs import built_on_simple, promise
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.search import searcher_of
+from wind_sensors.diagnosis.explaining.fitting import Term, fit, planted
+from wind_sensors.diagnosis.explaining.guesses import guesses_of
+from wind_sensors.diagnosis.explaining.moves import simplified
+from wind_sensors.diagnosis.explaining.pairs import built_on_simple, promise
+from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 
 

@@ -9,19 +9,19 @@ import numpy.typing as npt
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.decision import unstirred
+from wind_sensors.diagnosis.comparing import spectra
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Alternative, Judged, Naming, no_terms
-from wind_sensors.diagnosis.findings import equal_explanations
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Interval, Term, fit
-from wind_sensors.diagnosis.moments import is_steady, single_event
-from wind_sensors.diagnosis.moves import merged
-from wind_sensors.diagnosis.naming import blind_starts
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.explanation import Alternative, Judged, Naming, no_terms
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
+from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
+from wind_sensors.diagnosis.explaining.moves import merged
+from wind_sensors.diagnosis.explaining.naming import blind_starts
+from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.proving.decision import unstirred
+from wind_sensors.diagnosis.proving.findings import equal_explanations
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Series
 

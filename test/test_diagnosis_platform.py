@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.estimation import process
 from wind_sensors.recordings.station_files import load_station

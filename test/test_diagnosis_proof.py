@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.fitting import Term, planted
-from wind_sensors.diagnosis.held_out import LEAST_CONTRAST, block_masks, wind_masks
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.proof import Proof, prove
-from wind_sensors.diagnosis.whitening import trust_of, whitener_of
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.healthy.whitening import trust_of, whitener_of
+from wind_sensors.diagnosis.proving.held_out import LEAST_CONTRAST, block_masks, wind_masks
+from wind_sensors.diagnosis.proving.proof import Proof, prove
 from wind_sensors.station.signals import Recording
 
 OFFSET = Term(catalogue()["calibration_offset"], "cup", {"offset": -0.6})

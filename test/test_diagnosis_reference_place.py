@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 from test_diagnosis_naming import STATION, recorded
 
 from wind_sensors.cli.baseline import told_place
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.fitting import Term
-from wind_sensors.diagnosis.learning import default_baseline, learn
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.reference_lag import is_a_way_of_the_wind, misplaced
-from wind_sensors.diagnosis.reference_place import Place, delayed
-from wind_sensors.diagnosis.reference_search import located, pooled
-from wind_sensors.diagnosis.search import searcher_of
+from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
+from wind_sensors.diagnosis.healthy.reference_lag import is_a_way_of_the_wind, misplaced
+from wind_sensors.diagnosis.healthy.reference_search import located, pooled
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.signals import Recording
 

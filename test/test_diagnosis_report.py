@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.baseline import ChannelBaseline
+from wind_sensors.diagnosis.comparing.observation import Channel
+from wind_sensors.diagnosis.comparing.observing import BANDS
+from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.observation import Channel
-from wind_sensors.diagnosis.observing import BANDS
-from wind_sensors.diagnosis.raw_statistics import STATISTICS
+from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.report.diagnosis_figures import activity_figure, statistics_figure
 from wind_sensors.report.diagnosis_page import page

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.guesses import guesses_of
-from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Pulses, Recording
 

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 
-from wind_sensors.diagnosis.acceptance import (
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.acceptance import (
     SMALLEST_SIZE,
     SMALLEST_SURE,
     SURE_ALONE_GAIN,
@@ -17,20 +20,17 @@ from wind_sensors.diagnosis.acceptance import (
     least_size,
     overlap,
 )
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.contradictions import undo_each_other, varies
-from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explanation import Judged, Naming, no_terms
-from wind_sensors.diagnosis.fitting import ALWAYS, Fit, Term, covariance_of, fit
-from wind_sensors.diagnosis.guesses import guesses_of
-from wind_sensors.diagnosis.leading import explaining_what_stands_out, leading_alone
-from wind_sensors.diagnosis.learning import default_baseline
-from wind_sensors.diagnosis.moments import is_its_moment
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.screening import scores_of
-from wind_sensors.diagnosis.search import Searcher, searcher_of
-from wind_sensors.diagnosis.signatures import LARGER
+from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, no_terms
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, covariance_of, fit
+from wind_sensors.diagnosis.explaining.guesses import guesses_of
+from wind_sensors.diagnosis.explaining.leading import explaining_what_stands_out, leading_alone
+from wind_sensors.diagnosis.explaining.moments import is_its_moment
+from wind_sensors.diagnosis.explaining.screening import scores_of
+from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.signatures import LARGER
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import default_baseline
+from wind_sensors.diagnosis.proving.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
 

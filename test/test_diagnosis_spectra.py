@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from wind_sensors.diagnosis import spectra
+from wind_sensors.diagnosis.comparing import spectra
 
 N, DT = 4096, 0.2
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from representatives import represented
 
-from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.learning import learn
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.watch import Watch, WatchSettings, store
 from wind_sensors.diagnosis.watch.replaying import replay
 from wind_sensors.diagnosis.watch.sequential import SequentialTest

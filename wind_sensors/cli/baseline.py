@@ -10,9 +10,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.learning import default_baseline, learn
-from wind_sensors.diagnosis.reference_place import Place
+from wind_sensors.diagnosis.comparing.reference_place import Place
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.station.model import Station

@@ -11,10 +11,10 @@ from rich.progress import Progress
 from rich.table import Table
 
 from wind_sensors.cli.baseline import learnt, read_baseline
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.regions import region_bank, strongest
-from wind_sensors.diagnosis.search import searcher_of
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.comparison_files import NAMES, write

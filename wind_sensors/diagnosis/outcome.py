@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.decision import Verdict
-from wind_sensors.diagnosis.findings import Finding, Unexplained
 from wind_sensors.diagnosis.json_output import finding_json
+from wind_sensors.diagnosis.proving.decision import Verdict
+from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import activity, spectra
-from wind_sensors.diagnosis.comparison import LOW_END, Comparison
-from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel
-from wind_sensors.diagnosis.observing import BANDS, Simulated
-from wind_sensors.diagnosis.raw_statistics import STATISTICS
-from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing.comparison import LOW_END, Comparison
+from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
+from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

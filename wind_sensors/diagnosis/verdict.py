@@ -8,17 +8,34 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.acceptance import ACCEPTED_GAIN
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.calibrated_range import is_calm, is_too_calm, need_calibration, too_calm
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.contradictions import (
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.explaining.acceptance import ACCEPTED_GAIN
+from wind_sensors.diagnosis.explaining.explanation import Naming
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.explaining.guesses import guesses_of
+from wind_sensors.diagnosis.explaining.naming import name
+from wind_sensors.diagnosis.explaining.screening import group_templates
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.calibrated_range import (
+    is_calm,
+    is_too_calm,
+    need_calibration,
+    too_calm,
+)
+from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess_of
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.proving.contradictions import (
     is_discordant,
     is_uneven,
     undo_each_other,
     varies,
 )
-from wind_sensors.diagnosis.decision import (
+from wind_sensors.diagnosis.proving.decision import (
     REMAINDER_P,
     Verdict,
     is_noisy,
@@ -28,27 +45,20 @@ from wind_sensors.diagnosis.decision import (
     verdict_of,
     with_own_noise,
 )
-from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import Effect
-from wind_sensors.diagnosis.explanation import Naming
-from wind_sensors.diagnosis.findings import Finding, Unexplained, equal_explanations, findings_of
-from wind_sensors.diagnosis.fitting import ALWAYS, planted
-from wind_sensors.diagnosis.guesses import guesses_of
-from wind_sensors.diagnosis.naming import name
-from wind_sensors.diagnosis.noise_level import Excess, described, excess_of
-from wind_sensors.diagnosis.observing import Simulated
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
-from wind_sensors.diagnosis.screening import group_templates
-from wind_sensors.diagnosis.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
-from wind_sensors.diagnosis.support import (
+from wind_sensors.diagnosis.proving.findings import (
+    Finding,
+    Unexplained,
+    equal_explanations,
+    findings_of,
+)
+from wind_sensors.diagnosis.proving.support import (
     borne_out,
     determined,
     made_up,
     passes_unseen,
     stands_out,
 )
-from wind_sensors.diagnosis.whitening import Whitener
+from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
 

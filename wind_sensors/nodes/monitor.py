@@ -15,7 +15,7 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.watch import Finding, Watch, WatchSettings
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.diagnostics import Level, Status, Updater

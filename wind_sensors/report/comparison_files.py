@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from wind_sensors.diagnosis import spectra
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.observing import Simulated
+from wind_sensors.diagnosis.comparing import spectra
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.regions import Found
 from wind_sensors.recordings.serialising import TopicMessages
 from wind_sensors.recordings.station_files import shipped_profiles

@@ -10,12 +10,12 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wind_sensors.diagnosis import activity, spectra
-from wind_sensors.diagnosis.baseline import ChannelBaseline
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.observation import NORMALISED_BANDS, Channel
-from wind_sensors.diagnosis.observing import BANDS, Simulated
-from wind_sensors.diagnosis.raw_statistics import STATISTICS
+from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, Channel
+from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
+from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
 from wind_sensors.diagnosis.regions import eddies
 from wind_sensors.report import style
 

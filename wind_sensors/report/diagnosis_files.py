@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.json_output import as_json
-from wind_sensors.diagnosis.observing import Simulated
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore

@@ -7,11 +7,11 @@ from html import escape
 
 import numpy as np
 
-from wind_sensors.diagnosis.decision import REMAINDER_SCORES
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.findings import Estimate, Finding
-from wind_sensors.diagnosis.fitting import ALWAYS
-from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS
+from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORES
+from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import OF_POWER, Found
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.diagnosis_figures import (

@@ -6,8 +6,8 @@ from html import escape
 
 from matplotlib.figure import Figure
 
-from wind_sensors.diagnosis.findings import Finding
 from wind_sensors.diagnosis.outcome import Outcome, Panel
+from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
 from wind_sensors.report.diagnosis_figures import as_svg
 from wind_sensors.report.diagnosis_page import (

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.preparing import prepare
-from wind_sensors.diagnosis.signatures import signature_bank, templates_of
+from wind_sensors.diagnosis.explaining.signatures import signature_bank, templates_of
 from wind_sensors.errors import UserError
 from wind_sensors.recordings import read_recording
 

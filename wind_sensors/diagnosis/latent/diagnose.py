@@ -11,8 +11,7 @@ from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
-from wind_sensors.diagnosis.findings import Estimate, Finding, Unexplained
-from wind_sensors.diagnosis.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.latent.headings import (
     BLOCK,
     Felt,
@@ -26,7 +25,8 @@ from wind_sensors.diagnosis.means.bench import Bench
 from wind_sensors.diagnosis.means.fits import fit, held_out, intervals
 from wind_sensors.diagnosis.means.search import Explained, Named, search
 from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
-from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
+from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station

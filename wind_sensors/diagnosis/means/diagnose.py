@@ -9,8 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.findings import Finding, Unexplained
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means import panels, silences
 from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import bench_of
@@ -41,6 +40,7 @@ from wind_sensors.diagnosis.means.vanes import (
     vane_standing,
 )
 from wind_sensors.diagnosis.outcome import Outcome, verdict_of
+from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
 from wind_sensors.errors import UserError
 from wind_sensors.station.signals import Recording, Series
 

@@ -9,8 +9,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.findings import Estimate, Finding, Unexplained
-from wind_sensors.diagnosis.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import CLIP, Bench, halves, huber
 from wind_sensors.diagnosis.means.fits import fit, intervals
@@ -19,7 +18,8 @@ from wind_sensors.diagnosis.means.pair_effects import rotor_effects
 from wind_sensors.diagnosis.means.search import Explained, Named
 from wind_sensors.diagnosis.means.silences import COLD, WARM, Ice, Silence
 from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
-from wind_sensors.diagnosis.proof import Proof
+from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
+from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 
 FloatArray = npt.NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from wind_sensors.diagnosis.comparison import Comparison
+from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.watch.direct import Oddity
 from wind_sensors.diagnosis.watch.finding import Finding
 

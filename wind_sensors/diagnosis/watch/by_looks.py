@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 
-from wind_sensors.diagnosis.baseline import Baseline
+from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.watch.blocks import Block, Told
 from wind_sensors.diagnosis.watch.finding import Finding
 from wind_sensors.diagnosis.watch.looking import Look, look

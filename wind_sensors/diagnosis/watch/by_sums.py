@@ -10,9 +10,10 @@ from collections import deque
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.baseline import Baseline
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.signatures import signature_bank, templates_of
+from wind_sensors.diagnosis.explaining.signatures import signature_bank, templates_of
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.whitening import in_series
 from wind_sensors.diagnosis.watch.blocks import Block, Told
 from wind_sensors.diagnosis.watch.confirming import confirmed
 from wind_sensors.diagnosis.watch.evidence import (
@@ -29,7 +30,6 @@ from wind_sensors.diagnosis.watch.naming import candidates, limited
 from wind_sensors.diagnosis.watch.normal import Normal
 from wind_sensors.diagnosis.watch.sequential import SequentialTest
 from wind_sensors.diagnosis.watch.settings import WatchSettings
-from wind_sensors.diagnosis.whitening import in_series
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.observing import BANDS, Simulated
-from wind_sensors.diagnosis.raw_statistics.pulses import INTERVALS
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS
 from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
 

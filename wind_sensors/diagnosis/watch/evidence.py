@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import Comparison, Trust
+from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
+from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
-from wind_sensors.diagnosis.learning import STANDING_TOLERANCES
-from wind_sensors.diagnosis.observing import Simulated
-from wind_sensors.diagnosis.signatures import Template
+from wind_sensors.diagnosis.explaining.signatures import Template
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import STANDING_TOLERANCES
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.decision import REMAINDER_SCORES
-from wind_sensors.diagnosis.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORES
 from wind_sensors.diagnosis.regions import Found
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.diagnosis.watch.believing import Rival, believed

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.effects.definition import Effect
-from wind_sensors.diagnosis.screening import Score, group_templates, starting_values
-from wind_sensors.diagnosis.signatures import Template
+from wind_sensors.diagnosis.explaining.screening import Score, group_templates, starting_values
+from wind_sensors.diagnosis.explaining.signatures import Template
 from wind_sensors.diagnosis.watch.evidence import Evidence, Registry, Snapshot
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis import activity, spectra
-from wind_sensors.diagnosis.baseline import Baseline, ChannelBaseline, station_deviation
-from wind_sensors.diagnosis.comparison import Comparison, Trust
-from wind_sensors.diagnosis.observation import Channel
-from wind_sensors.diagnosis.observing import Simulated
-from wind_sensors.diagnosis.whitening import SMALLEST_DEVIATION
+from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
+from wind_sensors.diagnosis.comparing.observation import Channel
+from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.healthy.baseline import Baseline, ChannelBaseline, station_deviation
+from wind_sensors.diagnosis.healthy.whitening import SMALLEST_DEVIATION
 
 FloatArray = npt.NDArray[np.float64]
 

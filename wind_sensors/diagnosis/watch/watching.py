@@ -8,10 +8,10 @@ from concurrent.futures import Executor
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.baseline import Baseline
-from wind_sensors.diagnosis.comparison import Comparison
-from wind_sensors.diagnosis.learning import default_baseline
-from wind_sensors.diagnosis.preparing import prepare
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.diagnosis.watch.blocks import Block, Judge
 from wind_sensors.diagnosis.watch.by_looks import LooksJudge
 from wind_sensors.diagnosis.watch.by_sums import SumsJudge

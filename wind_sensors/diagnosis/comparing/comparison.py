@@ -1,0 +1,370 @@
+"""A recording beside the simulation of its station: what the diagnosis works on.
+
+`Comparison` holds everything about one recording that does not depend on the station tried:
+the drive, the measured series and statistics, how far the reference can be trusted at each
+frequency, how large the residual's noise is. `Comparison.vector` turns a station into one vector of
+whitened differences, measured minus simulated, in which a healthy station gives white noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing.observation import Channel, Grid
+from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated, View
+from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
+from wind_sensors.diagnosis.comparing.turning import where_vanes_follow
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
+from wind_sensors.errors import UserError
+from wind_sensors.simulation.drive import Drive
+from wind_sensors.simulation.encoder import angle_readings
+from wind_sensors.simulation.memory import DriveMemory, Memory
+from wind_sensors.simulation.pulses import expected_signals, rotor_signals
+from wind_sensors.simulation.response import Response, respond
+from wind_sensors.simulation.wind_at_sensor import WindAtSensors
+from wind_sensors.station.changes import segments
+from wind_sensors.station.inputs import resolved
+from wind_sensors.station.model import Propeller, Rotor, Station
+from wind_sensors.station.signals import Angles, Pulses, Recording
+
+FloatArray = npt.NDArray[np.float64]
+
+LOW_END = 0.02
+"""Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
+
+FASTEST = 60.0
+"""A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
+
+SIMULATIONS = 64
+"""So many simulated channels are kept: a station that is tried again is not simulated again."""
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What a residual of one channel is worth at each coefficient.
+
+    Attributes:
+        slope: Share of the simulated coefficient that the instrument is expected to show.
+        deviation: Standard deviation of the residual's noise.
+        statistics_mean: Healthy mean of measured minus simulated statistics.
+        statistics_deviation: Its standard deviation; inf where the statistic is not used.
+        activity_deviation: Of measured minus simulated levels, shape (bands,); inf where unseen.
+    """
+
+    slope: FloatArray
+    deviation: FloatArray
+    statistics_mean: FloatArray
+    statistics_deviation: FloatArray
+    activity_deviation: FloatArray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One recording, prepared for comparing stations with it.
+
+    Attributes:
+        recording: The recording.
+        station: The station it is compared with at first (its own, or as commissioned).
+        drive: Wind, motion, air.
+        grid: Bins of the series.
+        channels: What is compared.
+        direction: Slow direction the apparent wind comes from, at the bins, continuous [rad].
+        speed: Slow apparent wind speed at the bins [m/s].
+        wind_from: Direction the apparent wind comes from at the bins, continuous [rad].
+        measured: Of the recording.
+        mask: Weight of each bin, 1 inside the blocks that count, 0 outside; None: all count.
+        expected: Simulated deviation of each vane from `direction` [rad], by channel name.
+            Deviations are counted on the turn that lies nearest to it, so that a vane which
+            swings through the opposite direction does not jump by a turn in one series only.
+        departure: Slow departure of a vane that stays far from there [rad], by channel name.
+        place: Where the reference stands; None: unknown.
+        memory: What instruments did in `drive`; None: nothing is kept.
+    """
+
+    recording: Recording
+    station: Station
+    drive: Drive
+    grid: Grid
+    channels: tuple[Channel, ...]
+    direction: FloatArray
+    speed: FloatArray
+    wind_from: FloatArray
+    measured: Simulated
+    mask: FloatArray | None = None
+    expected: Mapping[str, FloatArray] = field(default_factory=dict)
+    departure: Mapping[str, FloatArray] = field(default_factory=dict)
+    place: Place | None = None
+    memory: DriveMemory | None = field(default=None, repr=False, compare=False)
+    _simulated: Memory = field(
+        default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
+    )
+
+    @property
+    def view(self) -> View:
+        """How the recording and its simulations are looked at."""
+        return View(
+            self.station,
+            self.grid,
+            self.channels,
+            self.direction,
+            self.speed,
+            self.wind_from,
+            self.mask,
+            self.expected,
+            self.departure,
+        )
+
+    def within(self, mask: FloatArray) -> Comparison:
+        """The same comparison in the blocks of a mask only, shape (n,)."""
+        masked = replace(self, mask=self.masked(mask))
+        measured = masked.observe(self.recording.pulses, self.recording.angles)
+        return replace(masked, measured=measured)
+
+    def where_vanes_follow(self, explanations: Iterable[Simulated]) -> FloatArray:
+        """Weights that are zero while a vane and one of its simulations turn round apart, (n,)."""
+        vanes = [c.name for c in self.channels if c.kind == "vane_angle"]
+        apart = (
+            self.masked(self.measured.series[v] - simulated.series[v]) / self.speed
+            for simulated in explanations
+            for v in vanes
+        )
+        return where_vanes_follow(apart, self.grid)
+
+    def misfit_outside(self, weights: FloatArray, simulated: Simulated) -> float:
+        """Largest share of a vane's squared misfit that lies where weights are small."""
+        shares = [0.0]
+        for channel in self.channels:
+            if channel.kind == "vane_angle":
+                name = channel.name
+                misfit = self.masked(self.measured.series[name] - simulated.series[name]) ** 2
+                shares.append(float(np.sum(misfit * (1.0 - weights)) / max(misfit.sum(), 1e-12)))
+        return max(shares)
+
+    def with_reference_at(self, place: Place) -> Comparison:
+        """The same, with the wind that comes by if the reference stands so far from where it is
+        taken to stand."""
+        first = self.station.instrument(self.channels[0].instrument)
+        flow = WindAtSensors(self.station, self.drive).flow(first).wind
+        drive = delayed(self.drive, flow, place)
+        return replace(self, drive=drive, memory=DriveMemory(drive))
+
+    @property
+    def unseen(self) -> Simulated:
+        """Nothing of any channel."""
+        counted = self.measured.counted & activity.counted_segments(self.grid, self.mask)
+        return Simulated({}, {}, {}, {}, counted)
+
+    @property
+    def coefficients(self) -> int:
+        """Number of cosine coefficients compared in each channel."""
+        return self.view.coefficients
+
+    def respond(self, station: Station, only: Collection[str] = ()) -> Response:
+        """The station's instruments in this recording's wind."""
+        known = self.memory is not None and self.memory.drive is self.drive
+        return respond(station, self.drive, only=only, memory=self.memory if known else None)
+
+    def affected(self, station: Station, instrument: str) -> tuple[str, ...]:
+        """Instruments whose signals depend on a change of one entry of the station."""
+        if instrument in (PLATFORM, STATION):
+            return tuple(c.instrument for c in self.channels)
+        carried = tuple(
+            i.name
+            for i in station.instruments
+            if isinstance(i, Propeller) and i.mounted_on == instrument
+        )
+        return (instrument, *carried)
+
+    def signals(
+        self, station: Station, only: Collection[str] = ()
+    ) -> tuple[dict[str, Pulses], dict[str, Angles]]:
+        """Simulated pulses and readings; readings carry the stamps of the recorded ones."""
+        response = self.respond(station, only)
+        pulses = {}
+        angles = {}
+        for c in self.channels:
+            name = c.instrument
+            if only and name not in only:
+                continue
+            if c.kind == "rotor_rate":
+                turned = response.rotors[name].psi[-1]
+                if not np.isfinite(turned) or abs(turned) > FASTEST * self.drive.wind.shape[0]:
+                    raise ValueError(f"'{name}' runs away")
+                pulses[name] = rotor_signals(response, name)
+            else:
+                time = self.recording.angles[name].time
+                angles[name] = Angles(time, angle_readings(response, name, time))
+        return pulses, angles
+
+    def simulate(
+        self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
+    ) -> Simulated:
+        """Series and statistics of a station in this recording's wind.
+
+        Args:
+            station: The station.
+            only: Instruments to simulate; empty: all.
+            rest: Simulation to take the other instruments from.
+        """
+        seen = self.unseen if rest is None else rest
+        for channel in self.channels:
+            if not only or channel.instrument in only:
+                seen = seen.with_others(self._simulated_alone(station, channel.instrument))
+        return seen
+
+    def possible(
+        self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
+    ) -> Simulated | None:
+        """The same; None for a station that cannot be (its rotor runs away, its log is absurd)."""
+        try:
+            return self.simulate(station, only, rest)
+        except (UserError, ValueError):
+            return None
+
+    def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
+        """Series and statistics of one instrument."""
+        reaching = self._reaching(station, instrument)
+        changes = tuple(c for c in station.changes if c.instrument in {*reaching, PLATFORM})
+        parts = [station.instrument(name) for name in reaching]
+        key = repr((instrument, parts, station.platform, station.sensor_heading_deg, changes))
+        alone = station.model_copy(update={"changes": changes})
+        return self._simulated.of(
+            key,
+            lambda: self.observe(
+                *self.signals(alone, (instrument,)), self._expected_pulses(alone, instrument)
+            ),
+        )
+
+    def _expected_pulses(self, station: Station, instrument: str) -> dict[str, Pulses]:
+        """What a rotor whose pulses are lost or bounce by chance records on average."""
+        rotors = [
+            entry
+            for part in segments(station)
+            if isinstance(entry := part.station.instrument(instrument), Rotor)
+            and resolved(entry.pulses, "pulses").meaning != "angle"
+        ]
+        electronics = [rotor.electronics for rotor in rotors]
+        if not any(e.bounce_probability > 0.0 or e.loss_probability > 0.0 for e in electronics):
+            return {}
+        response = self.respond(station, (instrument,))
+        return {instrument: expected_signals(response, instrument)}
+
+    def _reaching(self, station: Station, instrument: str) -> tuple[str, ...]:
+        """Instruments on which the signals of one depend: itself and what carries it."""
+        own = station.instrument(instrument)
+        if isinstance(own, Propeller) and own.mounted_on:
+            return instrument, own.mounted_on
+        return (instrument,)
+
+    def observe(
+        self,
+        pulses: Mapping[str, Pulses],
+        angles: Mapping[str, Angles],
+        expected_pulses: Mapping[str, Pulses] | None = None,
+    ) -> Simulated:
+        """Series and statistics of pulses and readings, as `View.observe` gives them."""
+        return self.unseen.with_others(self.view.observe(pulses, angles, expected_pulses))
+
+    def masked(self, values: FloatArray) -> FloatArray:
+        """Values of the bins with those outside the mask set to zero."""
+        return self.view.masked(values)
+
+    def coherence(self, simulated: Simulated, channel: Channel) -> spectra.Coherence:
+        """Coherence of measured and simulated series, a vane's with its slow turning included."""
+        name = channel.name
+        measured, expected = self.measured.series[name], simulated.series[name]
+        if channel.kind == "vane_angle":
+            slow = (self.direction - np.mean(self.direction)) * self.speed
+            measured, expected = measured + slow, expected + slow
+        n = self.coefficients
+        measured, expected = self.masked(measured), self.masked(expected)
+        return spectra.coherence_of(
+            spectra.to_cosine(measured)[:n], spectra.to_cosine(expected)[:n],
+            self.grid.dt, self.grid.n,
+        )  # fmt: skip
+
+    def vector(self, simulated: Simulated, trust: Mapping[str, Trust]) -> FloatArray:
+        """Whitened differences of all channels, of all statistics, of all activities."""
+        parts = []
+        for channel in self.channels:
+            t = trust[channel.name]
+            parts.append(
+                (self.measured.cosine[channel.name] - t.slope * simulated.cosine[channel.name])
+                / t.deviation
+            )
+        for channel in self.channels:
+            t = trust[channel.name]
+            difference = (
+                self.measured.statistics[channel.name]
+                - simulated.statistics[channel.name]
+                - t.statistics_mean
+            )
+            parts.append(np.nan_to_num(difference / t.statistics_deviation))
+        for channel in self.channels:
+            name = channel.name
+            change = self.measured.activity(name) - simulated.activity(name)
+            parts.append(activity.compressed(change / self._activity_deviation(trust[name])))
+        return np.concatenate(parts)
+
+    def _activity_deviation(self, trust: Trust) -> FloatArray:
+        """Deviation of each activity, flat."""
+        return np.repeat(trust.activity_deviation, self.measured.counted.size)
+
+    @property
+    def channel_of_each(self) -> npt.NDArray[np.int_]:
+        """Number of the channel to which each of what is compared belongs, shape (l,)."""
+        numbers = np.arange(len(self.channels))
+        sizes = [self.measured.statistics[c.name].size for c in self.channels]
+        activities = [self.measured.levels[c.name].size for c in self.channels]
+        return np.concatenate(
+            (
+                np.repeat(numbers, self.coefficients),
+                np.repeat(numbers, sizes),
+                np.repeat(numbers, activities),
+            )
+        )
+
+    @property
+    def part_of_each(self) -> npt.NDArray[np.int_]:
+        """Number of the part to which each of what is compared belongs, shape (l,).
+
+        Parts are series, spectral bands, statistics of raw signals and activity of each channel.
+        """
+        statistics = [
+            np.where(np.arange(self.measured.statistics[c.name].size) < BANDS, 1, 2)
+            for c in self.channels
+        ]
+        activities = sum(self.measured.levels[c.name].size for c in self.channels)
+        series = np.zeros(self.coefficients * len(self.channels), dtype=np.int_)
+        kinds = np.concatenate((series, *statistics, np.full(activities, 3)))
+        return np.asarray(self.channel_of_each + len(self.channels) * kinds)
+
+    def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
+        """How far `vector` falls when what is compared rises by one, shape (l,)."""
+        parts = [trust[c.name].slope / trust[c.name].deviation for c in self.channels]
+        for channel in self.channels:
+            seen = np.isfinite(self.measured.statistics[channel.name])
+            deviation = trust[channel.name].statistics_deviation
+            parts.append(np.where(seen, 1.0 / deviation, 0.0))
+        parts.extend(1.0 / self._activity_deviation(trust[c.name]) for c in self.channels)
+        return np.concatenate(parts)
+
+    def residual_series(
+        self, simulated: Simulated, trust: Mapping[str, Trust]
+    ) -> dict[str, FloatArray]:
+        """Measured minus expected series of each channel, below the highest frequency."""
+        out = {}
+        for channel in self.channels:
+            name = channel.name
+            full = np.zeros(self.grid.n)
+            difference = (
+                self.measured.cosine[name] - trust[name].slope * simulated.cosine[name]
+            )
+            full[: difference.size] = difference
+            out[name] = spectra.from_cosine(full)
+        return out

@@ -1,0 +1,257 @@
+"""What a comparison sees of signals: series, spectra and statistics of every channel.
+
+`View` looks at a recording and at its simulations in the same way. What it sees is a `Simulated`,
+which `comparison` compares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing.observation import (
+    LOWEST_BAND_FREQUENCY,
+    NORMALISED_BANDS,
+    Channel,
+    Grid,
+    angle_series,
+    rate_series,
+)
+from wind_sensors.diagnosis.comparing.raw_statistics.changes import change_statistics
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import interval_statistics
+from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
+    erratic_statistics,
+    step_statistics,
+    stillness_statistics,
+)
+from wind_sensors.motion.frames import wrap
+from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.signals import Angles, Pulses, erratic
+
+FloatArray = npt.NDArray[np.float64]
+
+HIGHEST_FREQUENCY = 1.25
+"""Series are compared below this frequency [Hz]; above, only spectra are."""
+
+HIGHEST_OF_RATES = 2.2
+"""Spectra of rotors' rates end here [Hz]: bins of a rate see no more."""
+
+HIGHEST_OF_READINGS = 0.4
+"""Spectra of vanes end at this share of the rate at which they are read."""
+
+BANDS = len(NORMALISED_BANDS) - 1
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Series and statistics of the signals of one station, simulated or measured.
+
+    Attributes:
+        cosine: Cosine coefficients of each channel's series up to `HIGHEST_FREQUENCY`, by name.
+        series: The series, by channel name: m/s for a rotor, lateral m/s for a vane.
+        statistics: By channel name: log spectra in the normalised bands (nan: band not seen),
+            followed by what `STATISTICS` lists for its kind.
+        levels: By channel name: logarithm of the power of quick eddies in each segment, shape
+            (bands, segments).
+        counted: Segments that count, shape (segments,).
+    """
+
+    cosine: dict[str, FloatArray]
+    series: dict[str, FloatArray]
+    statistics: dict[str, FloatArray]
+    levels: dict[str, FloatArray]
+    counted: npt.NDArray[np.bool_]
+
+    def with_others(self, others: Simulated) -> Simulated:
+        """The same with channels taken from another."""
+        return Simulated(
+            {**self.cosine, **others.cosine},
+            {**self.series, **others.series},
+            {**self.statistics, **others.statistics},
+            {**self.levels, **others.levels},
+            self.counted,
+        )
+
+    def activity(self, channel: str) -> FloatArray:
+        """Levels of a channel beyond their mean over the segments that count, flat."""
+        return activity.contrasts(self.levels[channel], self.counted).ravel()
+
+    def flat(self, channels: Sequence[Channel]) -> FloatArray:
+        """What is compared: coefficients of all channels, all statistics, all activities, (l,)."""
+        return np.concatenate(
+            [self.cosine[c.name] for c in channels]
+            + [self.statistics[c.name] for c in channels]
+            + [self.activity(c.name) for c in channels]
+        )
+
+
+@dataclass(frozen=True)
+class View:
+    """How signals of a recording's time are looked at.
+
+    Attributes:
+        station: Gives the rotors' constants.
+        grid: Bins of the series.
+        channels: What is looked at.
+        direction: Slow direction the apparent wind comes from, at the bins, continuous [rad].
+        speed: Slow apparent wind speed at the bins [m/s].
+        wind_from: Direction the apparent wind comes from at the bins, continuous [rad].
+        mask: Weight of each bin, 1 inside the blocks that count, 0 outside; None: all count.
+        expected: Deviation of each vane from `direction` that is expected [rad], by channel name.
+            Deviations are counted on the turn that lies nearest to it.
+        departure: Slow departure of a vane that stays far from there [rad], by channel name.
+    """
+
+    station: Station
+    grid: Grid
+    channels: tuple[Channel, ...]
+    direction: FloatArray
+    speed: FloatArray
+    wind_from: FloatArray
+    mask: FloatArray | None = None
+    expected: Mapping[str, FloatArray] = field(default_factory=dict)
+    departure: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def coefficients(self) -> int:
+        """Number of cosine coefficients compared in each channel."""
+        return min(self.grid.n, int(2.0 * self.grid.n * self.grid.dt * HIGHEST_FREQUENCY))
+
+    def masked(self, values: FloatArray) -> FloatArray:
+        """Values of the bins with those outside the mask set to zero."""
+        return values if self.mask is None else values * self.mask
+
+    def observe(
+        self,
+        pulses: Mapping[str, Pulses],
+        angles: Mapping[str, Angles],
+        expected_pulses: Mapping[str, Pulses] | None = None,
+    ) -> Simulated:
+        """Series and statistics of pulses and readings; of those channels that have any.
+
+        Args:
+            pulses: Of rotors.
+            angles: Of vanes.
+            expected_pulses: For the series alone, where chance took part in `pulses`: which of
+                them it hit says nothing, and would hide what moves the series by as little.
+        """
+        seen = Simulated({}, {}, {}, {}, activity.counted_segments(self.grid, self.mask))
+        for channel in self.channels:
+            name = channel.instrument
+            if channel.kind == "vane_angle":
+                if name in angles:
+                    seen = seen.with_others(self._vane(channel, angles[name]))
+            elif name in pulses:
+                on_average = (expected_pulses or {}).get(name)
+                seen = seen.with_others(self._rotor(channel, pulses[name], on_average))
+        return seen
+
+    def _rotor(self, channel: Channel, pulses: Pulses, on_average: Pulses | None) -> Simulated:
+        rotor = self.station.instrument(channel.instrument)
+        assert isinstance(rotor, Rotor)
+        drawn = rate_series(pulses, rotor, self.grid)
+        series, cosine = drawn, self._cosine(drawn)
+        statistics = (
+            self._log_spectrum(cosine, self.grid.dt, channel, HIGHEST_OF_RATES),
+            interval_statistics(
+                pulses, rotor, self.wind_from, self.speed, self.grid, self.mask
+            ),
+            change_statistics(drawn, self.speed, self.mask),
+        )
+        if on_average is not None:
+            series = rate_series(on_average, rotor, self.grid)
+            cosine = self._cosine(series)
+        return self._of_one(channel, series, cosine, statistics, drawn)
+
+    def _vane(self, channel: Channel, readings: Angles) -> Simulated:
+        expected = self.expected.get(channel.name)
+        deviation = self._nearest_turn(
+            channel, angle_series(readings, self.direction, self.grid, expected)
+        )
+        angle = deviation + self.direction
+        followed = (deviation if expected is None else expected) + self.direction
+        statistics = (
+            self._vane_spectrum(readings, channel),
+            stillness_statistics(angle, followed, self.speed, self.mask),
+            erratic_statistics(readings, self.direction, self.grid, self.mask),
+            step_statistics(readings, self.grid, self.mask),
+            change_statistics(angle, self.speed, self.mask),
+        )
+        series = deviation * self.speed
+        cosine = spectra.to_cosine(self.masked(series))
+        return self._of_one(channel, series, cosine, statistics, series)
+
+    def _of_one(
+        self,
+        channel: Channel,
+        series: FloatArray,
+        cosine: FloatArray,
+        statistics: Sequence[FloatArray],
+        drawn: FloatArray,
+    ) -> Simulated:
+        """What is seen of one channel."""
+        mean_speed = float(np.mean(self.speed))
+        return Simulated(
+            {channel.name: cosine[: self.coefficients]},
+            {channel.name: series},
+            {channel.name: np.concatenate(statistics)},
+            {channel.name: activity.levels(drawn, channel, mean_speed, self.grid)},
+            activity.counted_segments(self.grid, self.mask),
+        )
+
+    def _cosine(self, values: FloatArray) -> FloatArray:
+        """Cosine coefficients of a rate, the slowest from its mean."""
+        full = spectra.to_cosine(self.masked(values - np.mean(values)))
+        full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
+        return full
+
+    def _nearest_turn(
+        self, channel: Channel, deviation: FloatArray, time: FloatArray | None = None
+    ) -> FloatArray:
+        """Deviations of a vane moved by whole turns to where they are expected."""
+        expected = self.expected.get(channel.name)
+        if expected is None:
+            return deviation
+        expected = expected + self.departure.get(channel.name, 0.0)
+        if time is not None:
+            expected = np.interp(time, self.grid.centres, expected)
+        turns = np.rint((deviation - expected) / (2.0 * np.pi))
+        return np.asarray(deviation - 2.0 * np.pi * turns, dtype=np.float64)
+
+    def _vane_spectrum(self, readings: Angles, channel: Channel) -> FloatArray:
+        time = self.grid.seconds(readings.time)
+        if time.size < 16:
+            return np.full(BANDS, np.nan)
+        dt = float(np.median(np.diff(time)))
+        around = np.interp(time, self.grid.centres, self.direction)
+        deviation = wrap(readings.angle - around)
+        good = np.isfinite(deviation) & ~erratic(readings)
+        if not good.any():
+            return np.full(BANDS, np.nan)
+        if not good.all():
+            deviation = np.interp(time, time[good], deviation[good])
+        deviation = self._nearest_turn(channel, deviation, time)
+        weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
+        return self._log_spectrum(
+            spectra.to_cosine(np.asarray(weighted)), dt, channel, HIGHEST_OF_READINGS / dt
+        )
+
+    def _log_spectrum(
+        self, coefficients: FloatArray, dt: float, channel: Channel, highest: float
+    ) -> FloatArray:
+        """Log mean square of the coefficients in the normalised bands."""
+        mean_speed = float(np.mean(self.speed))
+        frequency = spectra.cosine_frequencies(coefficients.size, dt)
+        edges = NORMALISED_BANDS * mean_speed / (2.0 * np.pi * channel.length)
+        out = np.full(BANDS, np.nan)
+        power = coefficients * coefficients
+        for k in range(BANDS):
+            low, high = max(edges[k], LOWEST_BAND_FREQUENCY), min(edges[k + 1], highest)
+            inside = (frequency >= low) & (frequency < high)
+            if high > 1.1 * low and np.count_nonzero(inside) >= 20:
+                out[k] = np.log(np.mean(power[inside]) + 1e-12)
+        return out

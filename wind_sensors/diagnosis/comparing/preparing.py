@@ -1,0 +1,164 @@
+"""From a recording and its station to a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.counted_time import where_reference_is
+from wind_sensors.diagnosis.comparing.observation import (
+    SERIES_INTERVAL,
+    Grid,
+    angle_series,
+    channels_of,
+    rate_series,
+)
+from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
+from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
+from wind_sensors.errors import UserError
+from wind_sensors.simulation.drive import drive_from_recording
+from wind_sensors.simulation.memory import DriveMemory
+from wind_sensors.simulation.wind_at_sensor import WindAtSensors
+from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.signals import Angles, Pulses, Recording
+
+FloatArray = npt.NDArray[np.float64]
+
+SHORTEST = 60.0
+"""A recording needs this much time in common with its reference [s]."""
+
+DIRECTION_TIME = 60.0
+SPEED_TIME = 10.0
+"""Direction and speed are slow ones over these times [s]."""
+
+HARDLY_TURNS = 0.4
+"""Below this share of the rate that it should have, a rotor's eddies say nothing."""
+
+
+def prepare(
+    recording: Recording, station: Station | None = None, place: Place | None = None
+) -> Comparison:
+    """Prepare a recording for comparison.
+
+    Args:
+        recording: With a reference wind.
+        station: Station to compare with; None: the recording's own.
+        place: Where the reference stands; None: unknown, its wind counts as that at the sensors.
+
+    Raises:
+        UserError: There is no reference, or too little of anything.
+    """
+    known = recording.station if station is None else station
+    drive = drive_from_recording(recording)
+    seconds = (len(drive) - 1) * drive.dt
+    if seconds < SHORTEST:
+        raise UserError(
+            f"Only {seconds:.0f} s of reference wind: too little to compare anything.",
+            recording.name,
+            f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
+        )
+    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
+    channels = tuple(
+        c
+        for c in channels_of(known)
+        if c.instrument in (recording.pulses if c.kind == "rotor_rate" else recording.angles)
+    )
+    if not channels:
+        raise UserError(
+            "No instrument of the station has signals in the recording.",
+            recording.name,
+            "Check the topics in the station file with `wind info`.",
+        )
+    first = known.instrument(channels[0].instrument)
+    flow = WindAtSensors(known, drive).flow(first).wind
+    if place is not None:
+        drive = delayed(drive, flow, place)
+        flow = WindAtSensors(known, drive).flow(first).wind
+    at = np.arange(len(drive)) * drive.dt
+    coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
+    speed = np.hypot(flow[:, 0], flow[:, 1])
+
+    def slowly(values: FloatArray, seconds: float) -> FloatArray:
+        width = min(int(seconds / drive.dt), values.size - 1) | 1
+        return np.interp(grid.centres, at, uniform_filter1d(values, width, mode="mirror"))
+
+    x, y = slowly(flow[:, 0], DIRECTION_TIME), slowly(flow[:, 1], DIRECTION_TIME)
+    slow_direction = np.unwrap(np.arctan2(-y, -x))
+    slow_speed = slowly(speed, SPEED_TIME)
+    empty = Simulated({}, {}, {}, {}, counted_segments(grid, None))
+    comparison = Comparison(
+        recording=recording,
+        station=known,
+        drive=drive,
+        grid=grid,
+        channels=channels,
+        direction=slow_direction,
+        speed=np.maximum(slow_speed, 0.5),
+        wind_from=np.interp(grid.centres, at, coming_from),
+        measured=empty,
+        place=place,
+        memory=DriveMemory(drive),
+    )
+    simulated, angles = comparison.signals(known)
+    turning = _where_rotors_turn(comparison, simulated)
+    comparison = replace(
+        comparison,
+        expected=_expected(comparison, angles),
+        measured=replace(empty, counted=empty.counted & turning),
+    )
+    known_wind = where_reference_is(recording, grid)
+    beside = _beside_expected(comparison)
+    departure = {name: slow_departure(angle, grid) for name, angle in beside.items()}
+    comparison = replace(comparison, departure=departure)
+    followed = where_vanes_follow(beside.values(), grid)
+    if not known_wind.all() or not followed.all():
+        return comparison.within(known_wind * followed)
+    return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
+
+
+def _where_rotors_turn(
+    comparison: Comparison, simulated: Mapping[str, Pulses]
+) -> npt.NDArray[np.bool_]:
+    """Segments in which no rotor nearly stands still that should turn, shape (segments,).
+
+    How lively a rotor is that stops and starts again depends on how its bearing lets go.
+    """
+    number = segments_of(comparison.grid)
+    turning = np.ones(int(number[-1]) + 1, dtype=np.bool_)
+    for channel in comparison.channels:
+        rotor = comparison.station.instrument(channel.instrument)
+        if isinstance(rotor, Rotor):
+            measured, expected = (
+                np.bincount(number, np.abs(rate_series(pulses, rotor, comparison.grid)))
+                for pulses in (
+                    comparison.recording.pulses[channel.instrument],
+                    simulated[channel.instrument],
+                )
+            )
+            turning &= measured >= HARDLY_TURNS * expected
+    return turning
+
+
+def _expected(comparison: Comparison, angles: Mapping[str, Angles]) -> dict[str, FloatArray]:
+    """Simulated deviation of each vane from the slow direction [rad]."""
+    return {
+        c.name: angle_series(angles[c.instrument], comparison.direction, comparison.grid)
+        for c in comparison.channels
+        if c.kind == "vane_angle"
+    }
+
+
+def _beside_expected(comparison: Comparison) -> dict[str, FloatArray]:
+    """Measured minus simulated angle of each vane [rad], by channel name."""
+    seen = comparison.observe({}, comparison.recording.angles).series
+    return {
+        name: series / comparison.speed - comparison.expected[name]
+        for name, series in seen.items()
+    }

@@ -1,0 +1,1 @@
+"""From a mismatch to effects of the catalogue that explain it."""

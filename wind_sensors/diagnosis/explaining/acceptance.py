@@ -1,0 +1,337 @@
+"""What an explanation must bring to be accepted, alone or beside another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
+from wind_sensors.diagnosis.explaining.explanation import Judged, no_terms, total
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
+from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
+from wind_sensors.diagnosis.healthy.reference_lag import is_a_way_of_the_wind
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
+
+ACCEPTED_GAIN = 14.0
+"""Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
+
+LOUDEST_FACTOR = 1.2
+"""A name needs this many times what the loudest of the healthy recordings promises."""
+
+PASSING_GAIN = 25.0
+"""What an effect must bring that begins or ends inside the record: any of many may do."""
+
+PASSING_SMOOTH_GAIN = 40.0
+"""The same if it smooths: for some minutes the reference sees other eddies than the instrument."""
+
+PASSING_FORM_GAIN = 60.0
+"""The same with several parameters: in a few minutes of wind from a few directions they fit many a
+wandering of the reference with sizes that undo each other."""
+
+MANY_FORMS = 3
+"""So many fitted parameters that have a healthy value count as several, whichever of them says how
+large the effect is: a lean makes of an imbalance what the wind's wandering needs."""
+
+ACCEPTED_FURTHER_GAIN = 32.0
+"""The same for a second effect on the same signals."""
+
+ACCEPTED_ELSEWHERE_GAIN = 22.0
+"""The same for a second effect on signals that the first does not reach."""
+
+FURTHER_SHARE = 0.1
+"""A further effect on the same signals must also bring this share of the gain so far."""
+
+LARGEST_INEXACTNESS = 1000.0
+"""But never more than this, or than the least share."""
+
+FURTHER_EXACT_SHARE = 0.05
+LARGEST_EXACT_INEXACTNESS = 150.0
+"""The same beside effects whose form is certain."""
+
+ALIKE = 0.05
+"""Further effects act in a part of what is compared (series, bands, statistics, activity) with
+this share of all that they change, in squares."""
+
+TRACE = 0.01
+"""An effect acts where it changes a signal by more than this share of its largest change."""
+
+PASSING_BESIDE = 3.0
+"""So many times more, if it begins or ends inside the record: effects grow and fade themselves."""
+
+LEAST_SHARE_BESIDE = 0.02
+LEAST_EXACT_SHARE_BESIDE = 0.005
+"""What brings less than this share of the gain so far is the form of what brought that; the second
+where that form is certain."""
+
+SMALLEST_SIZE = 0.7
+"""In units of the smallest size worth reporting."""
+
+SMALLEST_SURE = 0.35
+SURE_ALONE_GAIN = 50.0
+"""The same of the only effect, if it always holds and brings so much: nobody doubts it, and another
+name would have to take its place."""
+
+SMALLEST_TOLD = 0.4
+"""The same of what the signals tell without a fit: left out, it would be a riddle."""
+
+SMALLEST_BESIDE = 1.8
+"""The same beside another effect on the same signals, whose form a small one may make good."""
+
+STALL_SPEED = 4.5
+"""Up to this wind speed [m/s] a sticking bearing may hold a rotor."""
+
+
+def needed_gain(current: Fit, further: Term, baseline: Baseline) -> float:
+    """Gain that a further term has to bring.
+
+    Args:
+        current: The explanation so far.
+        further: The term.
+        baseline: Knows how loud healthy days are.
+    """
+    least = ACCEPTED_ELSEWHERE_GAIN if current.terms else ACCEPTED_GAIN
+    return max(least, LOUDEST_FACTOR * baseline.loudness(further.instrument))
+
+
+def passing_gain(term: Term) -> float:
+    """Gain that a term has to bring for its beginning or end inside the record; else nothing."""
+    if term.interval == ALWAYS or term.effect.legible:
+        return 0.0
+    effect = term.effect
+    graded = sum(p.healthy is not None and p.minimum > 0.0 for p in effect.parameters)
+    shaping = sum(p.healthy is not None and p.value_from == "fit" for p in effect.parameters)
+    if graded > 1 or shaping >= MANY_FORMS:
+        return PASSING_FORM_GAIN
+    return PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN
+
+
+def brought(
+    searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float
+) -> float:
+    """What a candidate gains over the terms before: in its own null and in likelihood, the less.
+
+    In its own null alone a flexible effect gains from the noise that it has fitted away. What one
+    event in the record brings does not count.
+    """
+    newest = candidate.fit.terms[-1]
+    if not plausible(candidate.fit) or is_a_way_of_the_wind(searcher.comparison, newest):
+        return -np.inf
+    whitener = candidate.whitener
+    before = (
+        fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
+        if current.terms
+        else no_terms(whitener, searcher)
+    )
+    comparison = searcher.comparison
+    if not is_steady(comparison, before, candidate.fit):
+        return -np.inf
+    if too_small(searcher, candidate.fit, total(before)):
+        return -np.inf
+    gain = total(before) - total(candidate.fit)
+    gain -= single_event(comparison, before, candidate.fit)
+    return min(gain, before_evidence - candidate.evidence)
+
+
+def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> float:
+    """What a further term must bring if it acts on signals that the terms so far change."""
+    further = longer.terms[-1]
+    reached = {
+        name
+        for term in current.terms
+        for name in searcher.comparison.affected(searcher.station, term.instrument)
+    }
+    beside = further.instrument in (reached | {STATION, PLATFORM})
+    if not current.terms or not beside or further.is_told:
+        return 0.0
+    if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
+        return np.inf
+    return times_beside(further) * inexact(searcher, whitener, current, longer)
+
+
+def times_beside(further: Term) -> float:
+    """How many times the inexactness of other effects a further one on the same signals brings."""
+    passing = further.interval != ALWAYS and not further.effect.legible
+    return PASSING_BESIDE if passing else 1.0
+
+
+def inexact(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> float:
+    """What the simulation's own inexactness is worth where further effects act.
+
+    Args:
+        searcher: The search.
+        whitener: A null.
+        fewer: An explanation.
+        more: One with further effects.
+    """
+    gained = gained_alike(searcher, whitener, fewer, more)
+    if all(term.effect.exact for term in fewer.terms):
+        share, largest = FURTHER_EXACT_SHARE, LARGEST_EXACT_INEXACTNESS
+        least = LEAST_EXACT_SHARE_BESIDE
+    else:
+        share, largest, least = FURTHER_SHARE, LARGEST_INEXACTNESS, LEAST_SHARE_BESIDE
+    most = max(largest, least * gained)
+    own = min(max(share * gained, ACCEPTED_FURTHER_GAIN), most)
+    return own * overlap(searcher, fewer, more)
+
+
+def gained_alike(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> float:
+    """What an explanation gains in the kinds of comparison in which further effects act.
+
+    Slots of the wrong width are seen in the intervals of pulses, with certainty; what moves the
+    mean of the same rotor has nothing to do with their form.
+
+    Args:
+        searcher: The search.
+        whitener: A null.
+        fewer: An explanation.
+        more: One with further effects.
+    """
+    nothing = whitener.of(searcher.bank.without)
+    before, after = whitener.of(fewer.simulated), whitener.of(more.simulated)
+    part = searcher.comparison.part_of_each
+    gained = np.bincount(part, nothing**2 - before**2)
+    changed = np.bincount(part, (after - before) ** 2)
+    alike = changed >= ALIKE * changed.sum()
+    return float(np.maximum(gained[alike], 0.0).sum())
+
+
+def overlap(searcher: Searcher, fewer: Fit, more: Fit) -> float:
+    """Share of what further effects change in the parts of the record where the others act.
+
+    A wake of another form slows the wind in another way behind the mast, not on the other side.
+
+    Args:
+        searcher: The search.
+        fewer: An explanation.
+        more: One with further effects.
+    """
+    comparison = searcher.comparison
+    known = {term.key for term in fewer.terms}
+    reached = {
+        name
+        for term in more.terms
+        if term.key not in known
+        for name in comparison.affected(searcher.station, term.instrument)
+    }
+    there = everywhere = 0.0
+    for channel in comparison.channels:
+        if channel.instrument not in reached:
+            continue
+        name = channel.name
+        acts = np.abs(fewer.simulated.series[name] - searcher.bank.without.series[name])
+        changed = (more.simulated.series[name] - fewer.simulated.series[name]) ** 2
+        there += float(np.sum(changed[acts > TRACE * float(acts.max(initial=0.0))]))
+        everywhere += float(np.sum(changed))
+    return there / everywhere if everywhere > 0.0 else 1.0
+
+
+def is_a_stall(searcher: Searcher, current: Fit, start: Term) -> bool:
+    """Whether a rotor's silence is what a braked bearing does in the wind of that time.
+
+    A bearing that sticks lets go later than the simulated friction does.
+    """
+    braked = any(t.effect.name == "bearing_friction" for t in current.terms)
+    if start.effect.name != "stuck_sensor" or not braked:
+        return False
+    comparison = searcher.comparison
+    for channel in comparison.channels:
+        if channel.instrument == start.instrument and channel.kind == "rotor_rate":
+            at = comparison.grid.centres + comparison.drive.elapsed
+            inside = (at > start.values["start"]) & (at < start.values["stop"])
+            if not inside.any():
+                return False
+            return float(np.median(comparison.speed[inside])) < STALL_SPEED
+    return False
+
+
+def may_join(further: Term, terms: Sequence[Term]) -> bool:
+    """Whether a term says something that others do not say already."""
+    return all(
+        further.key != term.key
+        and not (
+            further.instrument == term.instrument
+            and (
+                further.effect.name in term.effect.contains
+                or term.effect.name in further.effect.contains
+            )
+        )
+        for term in terms
+    )
+
+
+def plausible(candidate: Fit) -> bool:
+    """Whether the newest term is large enough to matter and its parameters are determined.
+
+    A search that ran into the bounds of a parameter has found the wrong effect.
+    """
+    return is_plausible(candidate.terms[-1], least_size(candidate.terms))
+
+
+def all_plausible(candidate: Fit) -> bool:
+    """Whether all terms are."""
+    least = least_size(candidate.terms)
+    return all(is_plausible(term, least) for term in candidate.terms)
+
+
+def least_size(terms: Sequence[Term]) -> float:
+    """How large terms have to be, in units of the smallest size worth reporting."""
+    alone = len(terms) == 1 and terms[0].interval == ALWAYS
+    return SMALLEST_SURE if alone else SMALLEST_SIZE
+
+
+def too_small(searcher: Searcher, candidate: Fit, nothing: float) -> bool:
+    """Whether the only term is small, and not so sure that it counts all the same.
+
+    In a calm nothing is sure: rotors near their starting speed do what no simulation does.
+
+    Args:
+        searcher: The search.
+        candidate: The explanation.
+        nothing: Cost beyond parameters without any effect, in the same null.
+    """
+    if len(candidate.terms) != 1 or large_enough(candidate.terms[0]):
+        return False
+    return is_calm(searcher.comparison) or nothing - total(candidate) < SURE_ALONE_GAIN
+
+
+def large_enough(term: Term, least: float = SMALLEST_SIZE) -> bool:
+    """Whether a term matters."""
+    return term.relative_size >= (SMALLEST_TOLD if term.is_told else least)
+
+
+def is_plausible(term: Term, least: float = SMALLEST_SIZE) -> bool:
+    """Whether one term is.
+
+    Args:
+        term: The term.
+        least: Size that it must have, in units of the smallest worth reporting.
+    """
+    if not large_enough(term, least):
+        return False
+    for parameter in term.effect.parameters:
+        margin = 0.02 * (parameter.high - parameter.low)
+        shapes = parameter.healthy is None and not parameter.wraps
+        fitted = shapes and parameter.value_from == "fit"
+        beyond = term.values[parameter.name] > parameter.high - margin
+        if parameter.low == -parameter.high:
+            beyond |= term.values[parameter.name] < parameter.low + margin
+        if fitted and beyond:
+            # A wake as wide as half the horizon is none, nor does a flow past a mast bend more.
+            return False
+        if not parameter.graded or parameter.healthy is None or parameter.minimum <= 0.0:
+            continue
+        reach = 0.85 * (parameter.high - 1.0)
+        if parameter.healthy == 1.0 and term.values[parameter.name] > 1.0 + reach:
+            return False
+        value = term.values[parameter.name]
+        at_bound = value < parameter.low + margin or value > parameter.high - margin
+        if at_bound and abs(value - parameter.healthy) > margin:
+            return False
+    return True

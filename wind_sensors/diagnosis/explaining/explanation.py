@@ -1,0 +1,169 @@
+"""Explanations of a recording: what they cost, what they must bring, what a naming holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.search import (
+    PENALTY_PER_FURTHER_PARAMETER,
+    PENALTY_PER_INTERVAL,
+    PENALTY_PER_PARAMETER,
+    Searcher,
+)
+from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
+
+
+EQUAL_SHARE = 0.03
+"""Explanations that differ by less than this share of the gain are equal: the simulation is not
+exact enough to tell them apart."""
+
+CLEARLY_BETTER = 12.0
+"""Drop of the penalised cost at which two effects take the place of another explanation, which an
+explanation must not miss to compete with another, and which a beginning or an end must bring."""
+
+
+def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
+    """What parameters and intervals cost; a term's second parameter costs more than its first."""
+    firsts = min(len(terms), parameters)
+    cost = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
+    for term in terms:
+        if term.interval != ALWAYS and not term.effect.legible:
+            cost += PENALTY_PER_INTERVAL * sum(
+                (term.interval[0] > 0.0, term.interval[1] is not None)
+            )
+    return cost
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """An explanation that lost.
+
+    Attributes:
+        fit: Its fit.
+        behind: How far its penalised cost lies above the winner's.
+    """
+
+    fit: Fit
+    behind: float
+
+
+@dataclass(frozen=True)
+class Naming:
+    """The explanation of a recording.
+
+    Attributes:
+        fit: Named terms, fitted; no terms: nothing was accepted.
+        whitener: The null in which the fit was made.
+        adequate: The null in which the named effects need not have the simulation's exact form.
+        nothing: White vector without any effect, in that null.
+        gain: Drop of the cost.
+        alternatives: Losers of the last round, for each accepted term, nearest first.
+        screened: Best scores of the first screening: effect, instrument, gain.
+    """
+
+    fit: Fit
+    whitener: Whitener
+    adequate: Whitener
+    nothing: FloatArray
+    gain: float
+    alternatives: tuple[Alternative, ...] = ()
+    screened: tuple[tuple[str, str, float], ...] = field(default=())
+
+
+def no_terms(whitener: Whitener, searcher: Searcher) -> Fit:
+    vector = whitener.of(searcher.bank.without)
+    return Fit((), float(vector @ vector), vector, searcher.bank.without, np.zeros((0, 0)), 0)
+
+
+def seen_in(whitener: Whitener, current: Fit) -> Fit:
+    """The same fit with its vector and cost in another null."""
+    vector = whitener.of(current.simulated)
+    return replace(current, vector=vector, cost=float(vector @ vector))
+
+
+def total(candidate: Fit) -> float:
+    return candidate.cost + parameter_cost(candidate.terms, candidate.active)
+
+
+def evidence(candidate: Fit, whitener: Whitener) -> float:
+    """Minus twice the log-likelihood with the noise as the candidate itself leaves it, penalised.
+
+    Unlike the cost in one null it compares explanations that are each judged in their own: what
+    explains more leaves less noise, and pays less for the sum of its logarithms.
+
+    Args:
+        candidate: A fit.
+        whitener: The null in which it was made.
+    """
+    penalty = parameter_cost(candidate.terms, candidate.active)
+    return whitener.deviance(candidate.simulated) + penalty
+
+
+def in_own_noise(searcher: Searcher, candidate: Fit, named: Fit | None = None) -> float:
+    """Evidence of a fit in the null that it leaves, where it is.
+
+    Args:
+        searcher: The search.
+        candidate: A fit in whatever null.
+        named: Effects that are taken for granted, in a form that need not be exact.
+    """
+    return evidence(candidate, searcher.whitener(candidate.simulated, named))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fit in the null that it leaves itself.
+
+    Attributes:
+        fit: The fit.
+        whitener: Its null.
+        evidence: Minus twice the penalised log-likelihood.
+    """
+
+    fit: Fit
+    whitener: Whitener
+    evidence: float
+
+
+def judged(
+    searcher: Searcher,
+    explanations: Sequence[Fit],
+    named: Fit | None = None,
+    roughly: bool = False,
+    iterations: int = 3,
+) -> list[Judged]:
+    """Fits made again, each in its own null; best first.
+
+    Args:
+        searcher: The search.
+        explanations: Fits in whatever null.
+        named: Effects that are taken for granted, in a form that need not be exact.
+        roughly: Carry the fits' derivatives along, which may cost some units; for a first choice.
+        iterations: Largest number of Gauss-Newton steps.
+    """
+
+    def one(candidate: Fit) -> tuple[Fit, float]:
+        whitener = searcher.whitener(candidate.simulated, named)
+        again = fit(
+            whitener, searcher.station, candidate.terms, searcher.bank.without, iterations,
+            known=candidate if roughly else None, least=ROUGHLY,
+        )  # fmt: skip
+        whitener = searcher.whitener(again.simulated, named)
+        again = seen_in(whitener, again)
+        return again, evidence(again, whitener)
+
+    fits = in_parallel(one, list(explanations), searcher.workers)
+    return [
+        Judged(again, searcher.whitener(again.simulated, named), value)
+        for again, value in sorted(fits, key=lambda pair: pair[1])
+    ]
+
+

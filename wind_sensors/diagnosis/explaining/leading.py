@@ -1,0 +1,186 @@
+"""Which of several explanations leads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wind_sensors.diagnosis.explaining.acceptance import (
+    brought,
+    inexactness,
+    is_plausible,
+    needed_gain,
+    passing_gain,
+)
+from wind_sensors.diagnosis.explaining.explanation import (
+    CLEARLY_BETTER,
+    EQUAL_SHARE,
+    Judged,
+    evidence,
+    judged,
+    no_terms,
+)
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN
+from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.proving.findings import EQUAL_LIKELIHOOD
+from wind_sensors.diagnosis.regions import region_bank
+
+STANDS_OUT = 0.05
+"""Probability, on a healthy day, of the strongest region below which it asks for an explanation."""
+
+EXPLAINED = 0.5
+"""Share of the region's score below which what is left is no more than its noise."""
+
+
+def leader_of(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    ranked: Sequence[Judged],
+) -> Judged | None:
+    """The explanation that brings most of those that bring enough; None: there is none.
+
+    What the signals tell by themselves comes first. Of the others only those compete that are not
+    clearly behind in likelihood; of those that bring the same the likeliest leads. One that is both
+    simpler and likelier leads in any case.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        ranked: Explanations with one more, best first.
+    """
+    so_far = evidence(current, whitener)
+    enough: list[tuple[float, Judged]] = []
+    likeliest = np.inf
+    for one in sorted(ranked, key=not_told):
+        told = one.fit.terms[-1].is_told
+        if one.evidence > likeliest + CLEARLY_BETTER:
+            break
+        brings = brought(searcher, one, current, so_far)
+        newest = one.fit.terms[-1]
+        least = max(
+            needed_gain(current, newest, searcher.baseline),
+            passing_gain(newest),
+            inexactness(searcher, whitener, current, one.fit),
+        )
+        if brings >= least and told:
+            return one
+        if brings >= least:
+            enough.append((brings, one))
+            likeliest = min(likeliest, one.evidence)
+    if not enough:
+        return None
+    enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough)]
+    enough = explaining_what_stands_out(searcher, whitener, current, enough)
+    most = max(brings for brings, _ in enough)
+    leader = next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
+    simpler = [
+        one
+        for _, one in enough
+        if one.evidence < leader.evidence and one.fit.active < leader.fit.active
+    ]
+    return min(simpler, key=lambda one: one.evidence, default=leader)
+
+
+def explaining_what_stands_out(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    enough: list[tuple[float, Judged]],
+    near: float = 2.0 * EQUAL_LIKELIHOOD,
+) -> list[tuple[float, Judged]]:
+    """Of explanations that bring as much as the best, those of the region that stands out.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        enough: What each brings, and the explanation.
+        near: What brings less than the best by no more than this brings as much.
+    """
+    most = max(brings for brings, _ in enough)
+    rivals = [pair for pair in enough if pair[0] > most - near]
+    if len({one.fit.terms[-1].key for _, one in rivals}) < 2:
+        return enough
+    bank = region_bank(whitener, searcher.bank.without)
+    before = bank.scores(current.vector)
+    strongest = int(np.argmax(before))
+    if bank.p_value(float(before[strongest])) > STANDS_OUT:
+        return enough
+
+    def left(one: Judged) -> float:
+        return float(bank.scores(whitener.of(one.fit.simulated))[strongest])
+
+    explaining = [p for p in rivals if left(p[1]) < EXPLAINED * float(before[strongest])]
+    return explaining or enough
+
+
+def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
+    """The single effect that is left of two, or the one that led before the second came.
+
+    Where the first explains what stands out and the other does not, only one that brings clearly
+    more takes its place.
+
+    Args:
+        searcher: The search.
+        left: What is left of the explanation by two effects.
+        alone: The single effect that led.
+    """
+    if left.terms[0].key == alone[0].key:
+        return left
+    whitener = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(whitener, searcher)
+    so_far = evidence(nothing, whitener)
+    first = fit(whitener, searcher.station, alone, searcher.bank.without)
+    rivals = [
+        (brought(searcher, one, nothing, so_far), one) for one in judged(searcher, [left, first])
+    ]
+    rivals = explaining_what_stands_out(searcher, whitener, nothing, rivals, CLEARLY_BETTER)
+    return max(rivals, key=lambda rival: rival[0])[1].fit
+
+
+def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -> bool:
+    """Whether an effect that passes would explain nearly as much if it always held."""
+    newest = one.fit.terms[-1]
+    if newest.interval == ALWAYS or newest.effect.legible:
+        return False
+    return any(
+        other.fit.terms[-1].key == newest.key
+        and other.fit.terms[-1].interval == ALWAYS
+        and other.evidence < one.evidence + CLEARLY_BETTER
+        for _, other in others
+    )
+
+
+def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judged:
+    """The explanation with its last effect all the time, where that explains nearly as much.
+
+    A fit that has to find a large effect from a small one may go astray over the whole record and
+    arrive in a part of it. An interval that the raw signals show by themselves stays unless the
+    whole record explains clearly more.
+
+    Args:
+        searcher: The search.
+        one: An explanation.
+        named: The terms so far; None: there are none.
+    """
+    newest = one.fit.terms[-1]
+    read = any(guess.interval != ALWAYS for guess in searcher.guesses.get(newest.key, ()))
+    if newest.interval == ALWAYS or newest.effect.legible:
+        return one
+    terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
+    always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
+    (other,) = judged(searcher, [always], named)
+    allowed = -ONSET_GAIN if read else CLEARLY_BETTER
+    as_well = is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
+    return other if as_well else one
+
+
+def not_told(one: Judged) -> bool:
+    """Sorts what the signals tell by themselves before what only a fit says."""
+    return not one.fit.terms[-1].is_told

@@ -1,0 +1,259 @@
+"""Moves that remove, replace or merge the terms of an explanation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
+from wind_sensors.diagnosis.explaining.acceptance import (
+    ACCEPTED_FURTHER_GAIN,
+    ACCEPTED_GAIN,
+    all_plausible,
+    inexact,
+    is_plausible,
+    large_enough,
+    may_join,
+    needed_gain,
+    plausible,
+    times_beside,
+    too_small,
+)
+from wind_sensors.diagnosis.explaining.explanation import (
+    Alternative,
+    Judged,
+    evidence,
+    judged,
+    no_terms,
+    total,
+)
+from wind_sensors.diagnosis.explaining.fitting import (
+    ALWAYS,
+    ROUGHLY,
+    Fit,
+    Term,
+    fit,
+    planted,
+    without_term,
+)
+from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+
+MERGE_CANDIDATES = 8
+MERGE_FINALISTS = 3
+SWAP_CANDIDATES = 3
+SWAP_GAIN = 1.0
+
+
+LOOKS = (0.75, 0.88, 1.14, 1.33)
+"""Sizes at which a fit is looked at again, in its own: a vane that turns round the other way, or a
+pulse on the other side of a bin's border, leaves hollows in the cost that small steps stay in."""
+MOST_LOOKS = 4
+
+
+def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit from the best of the sizes around its own, while that is clearly better.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+    """
+    for _ in range(MOST_LOOKS):
+        costs = [(_cost(searcher, whitener, terms), terms) for terms in _around(current.terms)]
+        cost, terms = min(costs, key=lambda pair: pair[0], default=(current.cost, ()))
+        if cost > current.cost - ROUGHLY:
+            return current
+        current = fit(whitener, searcher.station, terms, searcher.bank.without)
+    return current
+
+
+def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
+    """The terms with one parameter larger or smaller."""
+    found = []
+    for k, term in enumerate(terms):
+        for parameter in term.effect.parameters:
+            healthy, value = parameter.healthy, term.values[parameter.name]
+            if healthy is None or value == healthy or parameter.value_from != "fit":
+                continue
+            for factor in LOOKS:
+                moved = healthy + factor * (value - healthy)
+                if parameter.low <= moved <= parameter.high:
+                    other = replace(term, values={**term.values, parameter.name: moved})
+                    found.append((*terms[:k], other, *terms[k + 1 :]))
+    return found
+
+
+def _cost(searcher: Searcher, whitener: Whitener, terms: Sequence[Term]) -> float:
+    simulated = whitener.comparison.possible(planted(searcher.station, terms))
+    if simulated is None:
+        return math.inf
+    vector = whitener.of(simulated)
+    return float(vector @ vector)
+
+
+def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit without terms that later ones made superfluous."""
+    while len(current.terms) > 1:
+        parts = [without_term(current, k) for k in range(len(current.terms))]
+        without = [
+            fit(
+                whitener,
+                searcher.station,
+                part.terms,
+                searcher.bank.without,
+                known=part,
+                least=ROUGHLY,
+            )
+            for part in parts
+        ]
+        best = min(without, key=total)
+        if total(best) - total(current) > ACCEPTED_GAIN and all(
+            large_enough(t) for t in current.terms
+        ):
+            break
+        current = best
+    return current
+
+
+def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit without what ran into its bounds, or became too small, when all were fitted together.
+
+    Of an effect that says too much (ice without weight) what it contains may stay.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+    """
+    nothing = no_terms(whitener, searcher)
+    while not all_plausible(current) or too_small(searcher, current, total(nothing)):
+        fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms))
+        sound = [f for f in fewer if f.terms and all_plausible(f)]
+        sound = sound or [f for f in fewer if f.terms]
+        if not sound:
+            return nothing
+        current = min(sound, key=total)
+        needed = min(needed_gain(nothing, term, searcher.baseline) for term in current.terms)
+        if total(nothing) - total(current) < needed:
+            return nothing
+    return current
+
+
+def _simpler(searcher: Searcher, terms: Sequence[Term]) -> list[list[Term]]:
+    """The terms without the implausible ones, and with what these contain in their place."""
+    sound = [term for term in terms if is_plausible(term)]
+    out = [sound] if sound else []
+    for term in terms:
+        if is_plausible(term):
+            continue
+        for contained in sorted(term.effect.contains & searcher.effects.keys()):
+            effect = searcher.effects[contained]
+            values = {p.name: term.values[p.name] for p in effect.parameters
+                      if p.name in term.values}
+            if len(values) == len(effect.parameters):
+                out.append([*sound, replace(term, effect=effect, values=values)])
+    return out
+
+
+def merged(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    singles: Sequence[Sequence[Term]],
+    excluded: frozenset[str],
+) -> Fit:
+    """One effect in the place of several, where it does nearly as well.
+
+    None takes the place of what the signals tell. One of the several themselves has to come as
+    close as the others would have had to bring; another one may miss more.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation by several effects.
+        singles: Single effects that did well in the beginning.
+        excluded: Names of effects that are not to be used.
+    """
+    if len(current.terms) < 2 or any(term.is_told for term in current.terms):
+        return current
+    instruments = [t.instrument for t in current.terms]
+    crowded = {name for name in instruments if instruments.count(name) > 1}
+    crowded |= {STATION, PLATFORM}
+    nothing = no_terms(whitener, searcher)
+    known = {terms[0].key for terms in singles}
+    more = [
+        (starts[0],)
+        for starts in searcher.single_candidates(whitener, nothing.vector, MERGE_CANDIDATES)
+        if starts[0].key not in known and starts[0].effect.name not in excluded
+    ]
+    intervals = {ALWAYS, *(t.interval for t in current.terms)}
+    candidates: dict[tuple[tuple[str, str], object], list[Term]] = {
+        (terms[0].key, interval): [replace(terms[0], interval=interval)]
+        for terms in (*more, *reversed(singles))
+        if terms[0].instrument in crowded
+        for interval in intervals
+    }
+    fits = searcher.refit_all(whitener, list(candidates.values()))
+    promising = sorted((f for f in fits if plausible(f)), key=total)[:MERGE_FINALISTS]
+    ranked = [r for r in judged(searcher, promising) if plausible(r.fit)]
+    if not ranked:
+        return current
+    alone = ranked[0]
+    margin = inexact(searcher, whitener, alone.fit, current)
+    further = [t for t in current.terms if t.key != alone.fit.terms[0].key]
+    if len(further) == len(current.terms):
+        margin += ACCEPTED_FURTHER_GAIN
+    else:
+        margin *= max(times_beside(t) for t in further)
+    if alone.evidence < evidence(current, whitener) + margin:
+        return alone.fit
+    return current
+
+
+def swapped(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    excluded: frozenset[str] = frozenset(),
+) -> tuple[Fit, tuple[Alternative, ...]]:
+    """The explanation with single terms exchanged for better ones, and those that come close.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+        excluded: Names of effects that are not to be used.
+    """
+    losers: list[Judged] = []
+    leader = Judged(current, whitener, evidence(current, whitener))
+    for k in range(len(current.terms)):
+        if current.terms[k].is_told:
+            continue
+        part = without_term(current, k)
+        others = part.terms
+        without = fit(
+            whitener, searcher.station, others, searcher.bank.without, iterations=3, known=part,
+            least=ROUGHLY,
+        )  # fmt: skip
+        candidates = [
+            starts
+            for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
+            if may_join(starts[0], others)
+            and starts[0].key != current.terms[k].key
+            and starts[0].effect.name not in excluded
+        ]
+        rivals = [
+            f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)
+        ]
+        ranked = [r for r in judged(searcher, rivals) if plausible(r.fit)]
+        losers.extend(ranked)
+        if ranked and ranked[0].evidence < leader.evidence - SWAP_GAIN:
+            losers.append(leader)
+            leader = ranked[0]
+            current = leader.fit
+    behind = [
+        Alternative(r.fit, r.evidence - leader.evidence) for r in losers if r is not leader
+    ]
+    return current, tuple(sorted(behind, key=lambda a: a.behind))

@@ -1,0 +1,392 @@
+"""From scores to names: accept, compare, remove."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wind_sensors.diagnosis.explaining.acceptance import (
+    is_a_stall,
+    may_join,
+    needed_gain,
+    plausible,
+    too_small,
+)
+from wind_sensors.diagnosis.explaining.explanation import (
+    CLEARLY_BETTER,
+    EQUAL_SHARE,
+    Alternative,
+    Judged,
+    Naming,
+    evidence,
+    in_own_noise,
+    judged,
+    no_terms,
+    seen_in,
+    total,
+)
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, covariance_of, fit
+from wind_sensors.diagnosis.explaining.guesses import BLIND_IN_PARTS
+from wind_sensors.diagnosis.explaining.leading import (
+    held_throughout,
+    leader_of,
+    leading_alone,
+    not_told,
+)
+from wind_sensors.diagnosis.explaining.moves import (
+    looked_around,
+    merged,
+    pruned,
+    simplified,
+    swapped,
+)
+from wind_sensors.diagnosis.explaining.onsets import refined_interval, window_starts, with_interval
+from wind_sensors.diagnosis.explaining.pairs import better_pair
+from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+
+MOST_EFFECTS = 2
+
+NARROW_SHARE = 0.85
+"""Effects of single instruments win over broad ones from this share of their gain on, beyond what
+both explanations share, if they need fewer parameters."""
+
+BROAD_PARAMETERS = 3
+"""From so many fitted parameters on, an explanation with a broad effect is challenged."""
+
+FIRST_CANDIDATES = 9
+LATER_CANDIDATES = 6
+FINALISTS = 7
+CONTENDERS = 5
+FAR_BEHIND = 0.8
+"""Fits that miss more than this share of the leader's gain do not compete with it."""
+
+WORTH_JUDGING = 0.5
+"""Share of the needed gain that a fit must bring before the noise is judged again."""
+
+WORTH_ANOTHER_TURN = 14.0
+"""Largest linear score below which no further effect is looked for."""
+
+
+def name(
+    searcher: Searcher, progress: Callable[[float], None] | None = None
+) -> Naming:
+    """Find the effects that explain the recording.
+
+    Effects are added one by one; then two simple ones may take the place of all. An effect of the
+    whole station may stand in for two of single instruments. Where it needs the help of others, the
+    search runs once more without such effects, and the better one counts.
+
+    Args:
+        searcher: Prepared search.
+        progress: Called with the share done.
+    """
+    whitener = searcher.whitener(searcher.bank.without)
+    singles = _single_fits(searcher, whitener)
+    found = _greedy(searcher, progress, whitener, singles, frozenset())
+    if found.fit.terms and not any(term.is_told for term in found.fit.terms):
+        pair = better_pair(searcher, whitener, singles, found.fit)
+        if pair is not None:
+            both = pruned(searcher, pair.whitener, pair.fit)
+            if len(both.terms) > 1:
+                return _settled(searcher, *swapped(searcher, pair.whitener, both), found.screened)
+    broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
+    if not broad or found.fit.active < BROAD_PARAMETERS:
+        return found
+    everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
+    narrow = _greedy(searcher, progress, whitener, singles, everywhere)
+    if narrow.fit.terms and _fits_better(searcher, narrow, found):
+        return narrow
+    simpler = (
+        0 < narrow.fit.active < found.fit.active
+        and len(narrow.fit.terms) <= len(found.fit.terms)
+    )
+    if not simpler:
+        return found
+    enough = NARROW_SHARE * _gain_beside(searcher, found, narrow)
+    return narrow if _gain_beside(searcher, narrow, found) > enough else found
+
+
+def _gain_beside(searcher: Searcher, one: Naming, other: Naming) -> float:
+    """Drop of the cost by those effects of an explanation that another one does not have."""
+    known = {term.key for term in other.fit.terms}
+    shared = [term for term in one.fit.terms if term.key in known]
+    if not shared:
+        return one.gain
+    without = fit(one.whitener, searcher.station, shared, searcher.bank.without, least=ROUGHLY)
+    return without.cost - one.fit.cost
+
+
+def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
+    """Whether an explanation fits clearly better than another."""
+    first, second = judged(searcher, [one.fit, other.fit])
+    wins = [t.key for t in first.fit.terms] == [t.key for t in one.fit.terms]
+    margin = max(CLEARLY_BETTER, EQUAL_SHARE * other.gain)
+    return wins and first.evidence < second.evidence - margin
+
+
+def _with_sharp_intervals(
+    searcher: Searcher, null: Whitener, ranked: Sequence[Judged], named: Fit | None
+) -> list[Judged]:
+    """The same explanations with beginnings and ends where they fit best; best first.
+
+    Args:
+        searcher: The search.
+        null: Of the terms so far.
+        ranked: Explanations with one more.
+        named: The terms so far; None: there are none.
+    """
+
+    def sharper(one: Judged) -> Fit:
+        return refined_interval(searcher, one.whitener, one.fit)
+
+    passing = [
+        r
+        for r in ranked
+        if r.fit.terms[-1].interval != ALWAYS and not r.fit.terms[-1].effect.legible
+    ]
+    lasting = [r for r in ranked if not any(r is p for p in passing)]
+    sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
+    others = searcher.refit_all(null, _fuller(searcher, sharp))
+    if sharp:
+        others += searcher.fit_all(null, named, blind_starts(searcher, sharp))
+    sound = judged(searcher, [f for f in others if plausible(f)], named)
+    if sound and sound[0].evidence < sharp[0].evidence:
+        # The interval is that of another effect so far.
+        sound += judged(searcher, [sharper(sound[0])], named)
+    return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
+
+
+def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
+    """Starting points, in the best of the intervals, of effects that the screening hardly sees.
+
+    Of those that act on the signals which the last effect there reaches.
+
+    Args:
+        searcher: The search.
+        passing: Explanations whose last effect begins or ends inside the record, best first.
+    """
+    *others, last = passing[0].fit.terms
+    reached = set(searcher.comparison.affected(searcher.station, last.instrument))
+    newest = [one.fit.terms[-1] for one in passing]
+    known = {term.key for term in newest if term.interval == last.interval}
+    found = []
+    for key, guesses in searcher.guesses.items():
+        touches = reached & set(searcher.comparison.affected(searcher.station, key[1]))
+        if key[0] not in BLIND_IN_PARTS or key in known or not touches:
+            continue
+        starts = [replace(g, interval=last.interval) for g in guesses]
+        if may_join(starts[0], others):
+            found.append(starts)
+    return found
+
+
+def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
+    """Explanations with an effect that contains the last one in its place, in the same interval.
+
+    Of several effects that begin at the same time the simplest is screened first.
+    """
+    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
+    found: dict[tuple[str, str], list[Term]] = {}
+    for one in passing:
+        *others, last = one.fit.terms
+        for effect in searcher.effects.values():
+            key = (effect.name, last.instrument)
+            if last.effect.name not in effect.contains or key not in possible or key in found:
+                continue
+            shared = {p.name: last.values[p.name] for p in effect.parameters
+                      if p.name in last.values}
+            values = {**effect.templates[0], **shared}
+            found[key] = [*others, replace(last, effect=effect, values=values)]
+    return list(found.values())
+
+
+def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
+    """Fits of the most promising effects, each alone."""
+    vector = whitener.of(searcher.bank.without)
+    return searcher.fit_all(
+        whitener,
+        None,
+        [
+            *searcher.single_candidates(whitener, vector, FIRST_CANDIDATES, blind=True),
+            *window_starts(searcher, whitener, vector, set()),
+        ],
+    )
+
+
+def _further_fits(
+    searcher: Searcher, whitener: Whitener, current: Fit, excluded: frozenset[str]
+) -> list[Fit]:
+    """Fits of the terms so far with one more each."""
+    used = {t.key for t in current.terms}
+
+    def eligible(starts: Sequence[Term]) -> bool:
+        return may_join(starts[0], current.terms) and starts[0].effect.name not in excluded
+
+    windowed = [
+        starts
+        for starts in window_starts(searcher, whitener, current.vector, used)
+        if eligible(starts)
+    ]
+    if not windowed:
+        scores = searcher.scores(whitener, current.vector)
+        if all(
+            s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
+        ):
+            return []
+    candidates = [
+        starts
+        for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
+        if eligible(starts) and not is_a_stall(searcher, current, starts[0])
+    ]
+    return searcher.fit_all(whitener, current, [*candidates, *windowed])
+
+
+def _greedy(
+    searcher: Searcher,
+    progress: Callable[[float], None] | None,
+    whitener: Whitener,
+    singles: Sequence[Fit],
+    excluded: frozenset[str],
+) -> Naming:
+    """Add the best effect, judge the noise again, and so on while it pays.
+
+    Args:
+        searcher: The search.
+        progress: Called with the share done.
+        whitener: The null without any effect.
+        singles: Fits of single effects in it.
+        excluded: Names of effects that are not to be used.
+    """
+    current = no_terms(whitener, searcher)
+    screened = tuple(
+        (s.effect, s.instrument, s.gain)
+        for s in searcher.scores(whitener, current.vector)[:12]
+    )
+    alternatives: tuple[Alternative, ...] = ()
+    alone: tuple[Term, ...] = ()
+    for turn in range(MOST_EFFECTS):
+        first = turn == 0
+        named = None if first else current
+        if named is not None:
+            # What is left is judged as what the named effects, in another form, do not explain.
+            whitener = searcher.whitener(named.simulated, named)
+            current = seen_in(whitener, current)
+        if first:
+            fits = [f for f in singles if f.terms[0].effect.name not in excluded]
+        else:
+            fits = _further_fits(searcher, whitener, current, excluded)
+        if progress:
+            progress((turn + 0.6) / MOST_EFFECTS)
+        sound = [f for f in fits if plausible(f) and not too_small(searcher, f, total(current))]
+        pool = _finalists(searcher, whitener, current, sound, named)
+        if not pool:
+            break
+        ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
+        ranked.sort(key=not_told)
+        ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
+        ranked = [r for r in ranked if plausible(r.fit)]
+        ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
+        leader = leader_of(searcher, whitener, current, ranked)
+        if leader is None:
+            break
+        leader = held_throughout(searcher, leader, named)
+        current = leader.fit
+        if first:
+            alone = current.terms
+        losers = tuple(
+            Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not leader
+        )
+        alternatives = (*alternatives, *losers) if not first else losers
+    whitener = searcher.whitener(current.simulated)
+    if current.terms:
+        current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
+    else:
+        current = seen_in(whitener, current)
+    if len(current.terms) > 1:
+        known = [alone, *((term,) for a in alternatives for term in a.fit.terms)]
+        current = pruned(searcher, whitener, current)
+        current = merged(searcher, whitener, current, known, excluded)
+        if len(current.terms) > 1:
+            current, alternatives = swapped(searcher, whitener, current, excluded)
+        else:
+            alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
+            current = leading_alone(searcher, current, alone)
+    if progress:
+        progress(1.0)
+    return _settled(searcher, current, alternatives, screened)
+
+
+def _finalists(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    fits: Sequence[Fit],
+    named: Fit | None,
+) -> list[Fit]:
+    """The fits that may win, in the null of the terms so far or in that which each leaves itself.
+
+    In the former, noise and coherence were judged with the mismatch still in them.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        fits: With one term more each.
+        named: The terms so far; None: there are none.
+    """
+    found: dict[int, Fit] = {k: f for k, f in enumerate(fits) if f.terms[-1].is_told}
+    own = [in_own_noise(searcher, f, named) for f in fits]
+    worth = False
+    for costs, so_far in (
+        ([total(f) for f in fits], total(current)),
+        (own, evidence(current, whitener)),
+    ):
+        order = np.argsort(costs, kind="stable")[:FINALISTS]
+        best = min(costs, default=so_far)
+        for k in order:
+            if costs[k] - best <= FAR_BEHIND * (so_far - best):
+                found[int(k)] = fits[k]
+        worth = worth or any(
+            so_far - cost >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
+            for cost, f in zip(costs, fits, strict=True)
+        )
+    return list(found.values()) if worth else []
+
+
+def _settled(
+    searcher: Searcher,
+    current: Fit,
+    alternatives: tuple[Alternative, ...],
+    screened: tuple[tuple[str, str, float], ...],
+) -> Naming:
+    """An explanation in the null that it leaves, with its beginnings and ends.
+
+    Args:
+        searcher: The search.
+        current: The explanation.
+        alternatives: Those that lost.
+        screened: Best scores of the first screening.
+    """
+    whitener = searcher.whitener(current.simulated)
+    current = looked_around(searcher, whitener, seen_in(whitener, current))
+    whitener = searcher.whitener(current.simulated)
+    current = simplified(searcher, whitener, seen_in(whitener, current))
+    if current.terms:
+        current = with_interval(searcher, current)
+        whitener = searcher.whitener(current.simulated)
+        current = seen_in(whitener, current)
+    nothing = whitener.of(searcher.bank.without)
+    adequate = whitener
+    if current.terms:
+        adequate = searcher.whitener(current.simulated, current)
+        current = replace(
+            current, covariance=covariance_of(adequate, searcher.station, current)
+        )
+    return Naming(
+        current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
+        alternatives, screened,
+    )  # fmt: skip

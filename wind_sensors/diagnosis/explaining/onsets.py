@@ -1,0 +1,271 @@
+"""Effects that begin or end inside the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.explaining.acceptance import plausible
+from wind_sensors.diagnosis.explaining.explanation import seen_in, total
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit, planted
+from wind_sensors.diagnosis.explaining.intervals import (
+    NEAR_AN_END,
+    IntervalGains,
+    cell_signatures,
+    interval_gains,
+    interval_of,
+)
+from wind_sensors.diagnosis.explaining.screening import (
+    JOINT_TEMPLATES,
+    Key,
+    Score,
+    group_sizes,
+    starting_values,
+)
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_INTERVAL, Searcher
+from wind_sensors.diagnosis.healthy.whitening import Whitener
+
+FloatArray = npt.NDArray[np.float64]
+
+WINDOW_STEP = 30.0
+"""Onsets and endings are screened every so many seconds."""
+
+SHORTEST_WINDOW = 60.0
+"""What lasts less [s] tells an effect badly from a gust."""
+
+WINDOW_CANDIDATES = 4
+WINDOW_ADVANTAGE = 15.0
+SMOOTHING_WINDOW_ADVANTAGE = 30.0
+LEAST_WINDOW_GAIN = 24.0
+"""What an effect must promise in a part of the record to be fitted there."""
+
+ONSET_GAIN = 25.0
+"""What a beginning or an end of a named effect must bring beyond its cost."""
+
+REFINING_STEPS = (15.0, 4.0, 1.0)
+"""Distances [s] between the beginnings and ends that are tried around the best so far."""
+
+REFINING_REACH = 8
+"""So many of them on either side."""
+
+
+@dataclass(frozen=True)
+class _Span:
+    """The interval in which an effect gains most beyond the cost of its beginning and end.
+
+    Attributes:
+        gain: Linear, without the cost.
+        net: With it.
+        window: [s since the first bin].
+        amplitudes: Of its templates.
+    """
+
+    gain: float
+    net: float
+    window: tuple[float, float]
+    amplitudes: FloatArray
+
+
+def _best_span(found: IntervalGains, shortest: float) -> _Span | None:
+    """The best interval that is not the whole record; None: there is none."""
+    cuts = found.cuts
+    last = cuts.size - 1
+    place = np.arange(cuts.size)
+    edges = (place[:, None] > 0).astype(int) + (place[None, :] < last)
+    long_enough = cuts[None, :] - cuts[:, None] >= shortest
+    net = np.where((edges > 0) & long_enough, found.gains - PENALTY_PER_INTERVAL * edges, -np.inf)
+    begin, end = np.unravel_index(int(np.argmax(net)), net.shape)
+    if not np.isfinite(net[begin, end]):
+        return None
+    return _Span(
+        float(found.gains[begin, end]), float(net[begin, end]),
+        (float(cuts[begin]), float(cuts[end])), found.amplitudes[begin, end],
+    )  # fmt: skip
+
+
+def _screening_cuts(searcher: Searcher) -> FloatArray:
+    length = searcher.comparison.grid.n * searcher.comparison.grid.dt
+    return np.append(np.arange(0.0, length - 0.5 * WINDOW_STEP, WINDOW_STEP), length)
+
+
+def window_starts(
+    searcher: Searcher, whitener: Whitener, vector: FloatArray, used: set[tuple[str, str]]
+) -> list[list[Term]]:
+    """Effects that explain clearly more when they hold in a part of the record only.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        vector: White vector of what is to be explained.
+        used: Effects and instruments that are named already.
+
+    Returns:
+        Starting points of the most promising, several for each.
+    """
+    bank = searcher.probes
+    always = {(s.effect, s.instrument): s.gain for s in searcher.scores(whitener, vector)}
+    cuts = _screening_cuts(searcher)
+    found: dict[Key, tuple[float, list[Term]]] = {}
+    for (key, multiple), members in group_sizes(bank.templates).items():
+        effect = searcher.effects[key[0]]
+        if key in used or effect.legible:
+            continue
+        cells = [
+            whitener.through_standing(
+                cell_signatures(
+                    searcher.comparison, bank.without, bank.with_each[k], whitener.trust, cuts
+                )
+            )
+            for k in members
+        ]
+        joint = len(members) <= JOINT_TEMPLATES
+        span = _best_span(interval_gains(cuts, cells, vector, joint), SHORTEST_WINDOW)
+        advantage = SMOOTHING_WINDOW_ADVANTAGE if effect.smooths else WINDOW_ADVANTAGE
+        if span is None or span.gain < max(
+            always.get(key, 0.0) + advantage, LEAST_WINDOW_GAIN
+        ):
+            continue
+        amplitudes = {
+            bank.templates[k].number: multiple * float(a)
+            for k, a in zip(members, span.amplitudes, strict=True) if a != 0.0
+        }  # fmt: skip
+        template = bank.templates[members[int(np.argmax(np.abs(span.amplitudes)))]]
+        score = Score(
+            *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)
+        )
+        interval = interval_of(searcher.comparison, *span.window)
+        starts = [Term(effect, key[1], starting_values(score), interval)]
+        starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
+        if key not in found or span.net > found[key][0]:
+            found[key] = (span.net, starts)
+    ranked = sorted(found.values(), key=lambda pair: -pair[0])
+    return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
+
+
+def _around(edge: float, step: float, low: float, high: float) -> FloatArray:
+    """Places around an edge, none near the ends of the record."""
+    places = edge + step * np.arange(-REFINING_REACH, REFINING_REACH + 1)
+    return np.asarray(places[(places > low + NEAR_AN_END) & (places < high - NEAR_AN_END)])
+
+
+def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
+    """The fit with its last term's beginning and end where they fit best.
+
+    First a coarse search that may also give it an end, or a beginning, that it did not have; then
+    finer ones around what it has.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        candidate: The fit.
+    """
+    comparison = searcher.comparison
+    fixed = candidate.terms[:-1]
+    without = comparison.possible(planted(searcher.station, fixed))
+    if without is None:
+        return candidate
+    best = candidate
+    always: Simulated | None = None
+    for step in (WINDOW_STEP, *REFINING_STEPS):
+        if always is None:
+            endless = replace(best.terms[-1], interval=ALWAYS)
+            always = comparison.possible(planted(searcher.station, [*fixed, endless]))
+        if always is None:
+            break
+        window = _best_window(
+            searcher, whitener, (without, always), best.terms[-1].interval, step
+        )
+        if window is None:
+            break
+        interval = interval_of(searcher.comparison, *window)
+        if interval in (best.terms[-1].interval, ALWAYS):
+            continue
+        moved = replace(best.terms[-1], interval=interval)
+        trial = fit(
+            whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2
+        )
+        if total(trial) < total(best):
+            best, always = trial, None
+    return best
+
+
+def _best_window(
+    searcher: Searcher,
+    whitener: Whitener,
+    simulated: tuple[Simulated, Simulated],
+    interval: Interval,
+    step: float,
+) -> tuple[float, float] | None:
+    """Where an effect gains most [s since the first bin]; None: there is no room to search.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        simulated: Without the effect, and with it all the time.
+        interval: Where it holds so far.
+        step: Distance of beginnings and ends [s]; at `WINDOW_STEP` anywhere in the record, below
+            around what there is.
+    """
+    comparison = searcher.comparison
+    without, always = simulated
+    since = comparison.drive.elapsed
+    length = comparison.grid.n * comparison.grid.dt
+    begin, end = interval
+    if step == WINDOW_STEP:
+        first = last = _screening_cuts(searcher)
+    else:
+        first = np.zeros(1) if begin <= 0.0 else _around(begin - since, step, 0.0, length)
+        last = np.array([length]) if end is None else _around(end - since, step, 0.0, length)
+    cuts = np.unique(np.concatenate(([0.0], first, last, [length])))
+    cells = cell_signatures(comparison, without, always, whitener.trust, cuts)
+    gains = interval_gains(
+        cuts, [whitener.through_standing(cells)], whitener.of(without), joint=False
+    )
+    if step == WINDOW_STEP:
+        span = _best_span(gains, SHORTEST_WINDOW)
+        return None if span is None else span.window
+    allowed = np.isin(cuts, first)[:, None] & np.isin(cuts, last)[None, :]
+    allowed &= cuts[None, :] - cuts[:, None] >= SHORTEST_WINDOW
+    if not allowed.any():
+        return None
+    net = np.where(allowed, gains.gains, -np.inf)
+    i, j = np.unravel_index(int(np.argmax(net)), net.shape)
+    return float(cuts[i]), float(cuts[j])
+
+
+def with_interval(searcher: Searcher, current: Fit) -> Fit:
+    """The explanation with beginnings and ends where its effects only hold for a while.
+
+    Judged in the null in which the effects need not have the simulation's exact form, so that a
+    wrong form does not pass for an interval.
+    """
+    comparison = searcher.comparison
+    for term in current.terms:
+        if term.interval != ALWAYS or term.effect.legible:
+            continue
+        whitener = searcher.whitener(current.simulated, current)
+        known = seen_in(whitener, current)
+        others = [t for t in current.terms if t.key != term.key]
+        without = comparison.possible(planted(searcher.station, others))
+        if without is None:
+            continue
+        start = whitener.of(without)
+        cuts = _screening_cuts(searcher)
+        cells = cell_signatures(comparison, without, current.simulated, whitener.trust, cuts)
+        gains = interval_gains(cuts, [whitener.through_standing(cells)], start, joint=False)
+        span = _best_span(gains, SHORTEST_WINDOW)
+        if span is None or known.cost - (float(start @ start) - span.net) < ONSET_GAIN:
+            continue
+        interval = interval_of(comparison, *span.window)
+        passing = replace(term, interval=interval)
+        trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
+        trial = refined_interval(searcher, whitener, trial)
+        always = fit(
+            whitener, searcher.station, current.terms, searcher.bank.without, known=current
+        )
+        if total(trial) < total(always) - ONSET_GAIN and plausible(trial):
+            current = trial
+    return current

@@ -1,0 +1,1 @@
+"""Whether data bear out an explanation, and what is said of it."""

@@ -1,0 +1,232 @@
+"""What contradicts an explanation in its own simulation: effects that undo each other, or vary."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from wind_sensors.diagnosis.comparing import spectra
+from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.explaining.explanation import Naming
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.intervals import cell_signatures, window_of
+from wind_sensors.diagnosis.healthy.whitening import in_series
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+LEAST_TOGETHER = 0.4
+LEAST_CHANGE = 30.0
+"""Two effects that change a signal must together change it by this share of the sum of what each
+does, in squares, if that is more than the second."""
+
+PARTS = 8
+VARIES = 30.0
+VARIES_SHARE = 0.03
+"""What always holds, in a form that is certain, is the same in every part, half and quarter of the
+record: a size of its own in one of them must not drop the cost by more than this, or than this
+share of the gain."""
+
+GROWS = 12.0
+GROWS_SHARE = 0.02
+"""Nor may a size that grows or shrinks steadily through the record drop it by more than this, or
+than this share of the gain: a clock that drifts is no delay."""
+
+LIVELY_TIME = 5.0
+"""A signal is lively or quiet by how fast it moves within so many seconds."""
+
+UNEVEN = 12.0
+UNEVEN_SHARE = 0.015
+"""An effect has one size, whether its signal is lively or quiet: another one in lively moments must
+not drop the cost by more than this, or than this share of the gain (a form that errs by a tenth
+brings a hundredth). What refuses jumps, or sticks and slips in its own way, is taken for a filter
+or for friction otherwise."""
+
+DISCORD = 20.0
+DISCORD_SHARE = 0.02
+"""An effect that reaches several signals has one size on all of them: one of its own on each must
+not drop the cost by more than this, or than this share of the gain. A heavier rotor slows its own
+signal as thin air does, which would let the vane overshoot as well."""
+
+
+def undo_each_other(naming: Naming, station: Station) -> bool:
+    """Whether two effects take back on some instrument most of what each does there.
+
+    Unless the statistics of its raw signals show, un-undone, that something is done.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+    """
+    if len(naming.fit.terms) < 2:
+        return False
+    comparison = naming.whitener.comparison
+    weights = comparison.weights(naming.whitener.trust)
+    without = comparison.simulate(station).flat(comparison.channels)
+
+    first, second = naming.fit.terms
+    squares = []
+    for terms in ((first,), (second,), naming.fit.terms):
+        moved = comparison.possible(planted(station, terms))
+        if moved is None:
+            return False
+        change = np.nan_to_num(moved.flat(comparison.channels) - without) * weights
+        squares.append(change**2)
+    one, other, together = (np.bincount(comparison.part_of_each, s) for s in squares)
+    changed = one + other > LEAST_CHANGE
+    undone = changed & (together < LEAST_TOGETHER * (one + other))
+    channels = len(comparison.channels)
+    # Pulses that bounce and a slow rotor undo each other in the mean; the bounces are seen.
+    seen = (changed & ~undone)[2 * channels : 3 * channels]
+    return bool(np.any(undone[:channels] & ~seen))
+
+
+def varies(naming: Naming, station: Station) -> bool:
+    """Whether an effect that should hold throughout has another size in a part of the record.
+
+    Only a form that is certain can be held to that: others depend on the wind in ways of their own,
+    and what they leave on the same signals is nothing against it.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    left = null.of(naming.fit.simulated)
+    share = VARIES_SHARE * naming.gain
+    inexact = {
+        name
+        for term in naming.fit.terms
+        if not term.effect.exact
+        for name in comparison.affected(comparison.station, term.instrument)
+    }
+    for term in naming.fit.terms:
+        alike = inexact & set(comparison.affected(comparison.station, term.instrument))
+        if term.effect.noisy or not term.effect.exact or alike:
+            continue
+        without = _without(naming, station, term)
+        if without is None:
+            continue
+        cuts = np.linspace(*window_of(comparison, term.interval), PARTS + 1)
+        cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
+        cells = null.through_standing(in_series(comparison, cells))
+        for length in (1, 2, 4):
+            parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
+            power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
+            if np.any((parts @ left) ** 2 / power > max(VARIES, share)):
+                return True
+        if _drop_by_growth(cells, left) > max(GROWS, GROWS_SHARE * naming.gain):
+            return True
+    return False
+
+
+def _drop_by_growth(cells: FloatArray, left: FloatArray) -> float:
+    """Drop of the cost if an effect's size went along a straight line in time.
+
+    Args:
+        cells: White signatures of neighbouring parts of equal length, shape (parts, m).
+        left: White vector of what is left, shape (m,).
+    """
+    whole = cells.sum(axis=0)
+    growing = (np.arange(len(cells)) - 0.5 * (len(cells) - 1)) @ cells
+    growing = growing - float(growing @ whole) / max(float(whole @ whole), 1e-9) * whole
+    return float(growing @ left) ** 2 / max(float(growing @ growing), 1.0)
+
+
+def unevenness(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if an effect had one size while its signals are lively, another while not.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: One of its effects.
+    """
+    comparison = naming.adequate.comparison
+    without = _without(naming, station, term)
+    if without is None:
+        return 0.0
+    halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
+    for k, channel in enumerate(comparison.channels):
+        lively = _lively(without.series[channel.name], comparison.grid.dt)
+        for half, weight in zip(halves, (1.0 - lively, lively), strict=True):
+            _put(half, naming, without, k, weight)
+    return _drop_by_own_sizes(naming, halves)
+
+
+def discord(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if an effect had a size of its own on each signal that it reaches.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: One of its effects.
+    """
+    null = naming.adequate
+    comparison = null.comparison
+    without = _without(naming, station, term)
+    if without is None:
+        return 0.0
+    change = naming.fit.simulated.flat(comparison.channels) - without.flat(comparison.channels)
+    change = np.nan_to_num(change) * comparison.weights(null.trust)
+    channel = comparison.channel_of_each
+    each = np.array([np.where(channel == k, change, 0.0) for k in range(len(comparison.channels))])
+    return _drop_by_own_sizes(naming, each[np.any(each, axis=1)])
+
+
+def is_discordant(naming: Naming, station: Station) -> bool:
+    """Whether an effect has another size on one of the signals that it reaches than on another."""
+    most = max(DISCORD, DISCORD_SHARE * naming.gain)
+    return any(discord(naming, station, term) > most for term in naming.fit.terms)
+
+
+def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:
+    """The simulation with the other effects only; None: it is not possible."""
+    others = [t for t in naming.fit.terms if t is not term]
+    return naming.adequate.comparison.possible(planted(station, others))
+
+
+def _put(part: FloatArray, naming: Naming, without: Simulated, k: int, weight: FloatArray) -> None:
+    """Write what an effect changes on one channel, weighted in time, into a part of it."""
+    comparison = naming.adequate.comparison
+    name = comparison.channels[k].name
+    n = comparison.coefficients
+    change = (naming.fit.simulated.series[name] - without.series[name]) * weight
+    trust = naming.adequate.trust[name]
+    coefficients = spectra.to_cosine(comparison.masked(change))[:n]
+    part[k * n : (k + 1) * n] = trust.slope / trust.deviation * coefficients
+
+
+def _drop_by_own_sizes(naming: Naming, parts: FloatArray) -> float:
+    """Drop of the cost if each part of an effect had a size of its own instead of a common one."""
+    if len(parts) < 2:
+        return 0.0
+    null = naming.adequate
+    left = null.of(naming.fit.simulated)
+    padded = np.pad(parts, ((0, 0), (0, left.size - parts.shape[1])))
+    white = null.through_standing(padded)
+    power = np.maximum(np.einsum("ij,ij->i", white, white), 1e-9)
+    sizes = white @ left / power
+    common = float(power @ sizes / power.sum())
+    return float(power @ (sizes - common) ** 2)
+
+
+def _lively(series: FloatArray, dt: float) -> FloatArray:
+    """Weights from nought where a series is quiet to one where it is lively, shape (n,)."""
+    moving = uniform_filter1d(np.gradient(series) ** 2, round(LIVELY_TIME / dt), mode="nearest")
+    rank = np.argsort(np.argsort(moving)) / max(series.size - 1, 1)
+    return np.asarray(np.clip(2.0 * rank - 0.5, 0.0, 1.0))
+
+
+def is_uneven(naming: Naming, station: Station) -> bool:
+    """Whether an effect has another size while its signals are lively than while they are quiet.
+
+    Those whose form is certain are held to one size in all parts of the record instead.
+    """
+    most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
+    return any(
+        unevenness(naming, station, term) > most
+        for term in naming.fit.terms
+        if not term.effect.exact and not term.effect.legible and not term.is_told
+    )

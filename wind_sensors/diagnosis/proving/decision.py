@@ -1,0 +1,239 @@
+"""From an explanation to a verdict: what it leaves, and when nothing can be said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
+from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.noise_level import Excess
+from wind_sensors.diagnosis.regions import RegionBank
+from wind_sensors.station.model import Station
+
+FloatArray = npt.NDArray[np.float64]
+
+Verdict = Literal["none", "named", "ambiguous", "unknown", "inconclusive"]
+
+REMAINDER_SCORES = {
+    "frequency": 60.0,
+    "statistic": 45.0,
+    "spectrum": 30.0,
+    "activity": 30.0,
+    "time": 30.0,
+    "direction": 30.0,
+    "heading": 30.0,
+    "speed": 16.0,
+    "all": 30.0,
+}
+"""Scores beyond which a remainder counts as structure, by kind of region. Gusts that come and go
+raise the power of a band on healthy days, too; a named effect leaves less than this where its form
+may differ from the simulation's."""
+
+STIRRED_KINDS = frozenset({"frequency", "spectrum", "activity"})
+"""Of these an effect that brings eddies of its own leaves more than the simulation knows."""
+
+REMAINDER_SCORE = 0.8
+REMAINDER_SHARE = 0.025
+LEAST_REMAINDER = 0.006
+"""A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
+times its share of what there was to explain is more than the second, and that share more than the
+third: of a large effect the form may leave more."""
+
+REMAINDER_P = 0.05
+"""Nor does a remainder count that a healthy day shows with more probability."""
+
+FREELY_BENT = 5
+BENT_REMAINDER_P = 0.01
+"""Effects with so many parameters are series that follow whatever goes with direction or heading:
+what they leave that a healthy day shows with less probability speaks against them however little
+it is."""
+
+NOISY = 6.0
+VERY_NOISY = 8.0
+"""Noise beyond this many standard deviations of healthy days is physics that a name left out;
+without any name, where a reference of another day may err more, beyond the second."""
+
+STIRRED = 0.01
+STIRRED_TIME = 5.0
+"""Where an effect with eddies of its own changes a signal by more than this share of its largest
+change, and for twice as many seconds before and after, a residual's noise says nothing."""
+
+LEAST_UNSTIRRED = 0.15
+"""Share of the record that must be left for its noise to be judged."""
+
+MOST_FREE_PARAMETERS = 2
+CERTAIN_GAIN = 50.0
+"""An explanation with more parameters that brings less than this must also stand out somewhere in
+the data."""
+
+TOO_BLUNT = 6.0
+"""A record that shows no effect below this many smallest sizes is inconclusive."""
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What an explanation leaves in the region where it leaves most.
+
+    Attributes:
+        score: Relative to the limit for a region of its kind.
+        p: Probability of it on a healthy day.
+        share: Of the whole misfit.
+    """
+
+    score: float
+    p: float
+    share: float
+
+    @property
+    def is_structure(self) -> bool:
+        """Whether there is more than healthy days show."""
+        return self.score > 1.0 and self.p < REMAINDER_P
+
+
+def located(
+    naming: Naming, bank: RegionBank, comparison: Comparison, baseline: Baseline
+) -> Remainder:
+    """What the recording shows before anything is named."""
+    score, relative = _largest(bank.scores(naming.nothing), bank, comparison, baseline)
+    return Remainder(relative, bank.p_value(score), 1.0)
+
+
+def remainder_of(
+    naming: Naming, bank: RegionBank, comparison: Comparison, baseline: Baseline
+) -> Remainder:
+    """What is left in the channels that the named effects reach.
+
+    What another instrument shows beside them says nothing against the names, nor does what a
+    healthy day shows as loudly, nor the power of eddies if they bring some of their own.
+    """
+    scores = bank.scores(naming.adequate.of(naming.fit.simulated))
+    if naming.fit.terms:
+        reached = {
+            instrument
+            for term in naming.fit.terms
+            for instrument in comparison.affected(comparison.recording.station, term.instrument)
+        }
+        channels = {c.name for c in comparison.channels if c.instrument in reached}
+        stirred = any(term.effect.stirs for term in naming.fit.terms)
+        counts = [
+            r.channel in channels and not (stirred and r.kind in STIRRED_KINDS)
+            for r in bank.regions
+        ]
+        scores = np.where(counts, scores, 0.0)
+    score, relative = _largest(scores, bank, comparison, baseline)
+    share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
+    return Remainder(relative, bank.p_value(score), share)
+
+
+def _largest(
+    scores: FloatArray, bank: RegionBank, comparison: Comparison, baseline: Baseline
+) -> tuple[float, float]:
+    """The score that exceeds its limit most, and how many times it does."""
+    loudest = {
+        c.name: LOUDEST_FACTOR * baseline.loudness(c.instrument) for c in comparison.channels
+    }
+    limits = np.array([max(REMAINDER_SCORES[r.kind], loudest[r.channel]) for r in bank.regions])
+    worst = int(np.argmax(scores / limits))
+    return float(scores[worst]), float(scores[worst] / limits[worst])
+
+
+def with_own_noise(naming: Naming) -> set[str]:
+    """Instruments whose named effects leave noise of their own."""
+    comparison = naming.whitener.comparison
+    return {
+        instrument
+        for term in naming.fit.terms
+        if term.effect.noisy
+        for instrument in comparison.affected(comparison.station, term.instrument)
+    }
+
+
+def unstirred(naming: Naming, station: Station) -> Comparison | None:
+    """The comparison without the seconds in which named effects bring eddies of their own.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+
+    Returns:
+        None: too little of the record is left.
+    """
+    comparison = naming.whitener.comparison
+    stirring = [t for t in naming.fit.terms if t.effect.stirs]
+    if not stirring:
+        return comparison
+    others = [t for t in naming.fit.terms if not t.effect.stirs]
+    without = comparison.simulate(planted(station, others))
+    acts = np.zeros(comparison.grid.n, dtype=np.bool_)
+    for channel in comparison.channels:
+        change = np.abs(naming.fit.simulated.series[channel.name] - without.series[channel.name])
+        acts |= change > STIRRED * max(float(change.max()), 1e-9)
+    width = round(2.0 * STIRRED_TIME / comparison.grid.dt)
+    calm = 1.0 - maximum_filter1d(acts.astype(float), 2 * width)
+    outside = uniform_filter1d(calm, width)
+    return comparison.within(outside) if np.mean(outside) > LEAST_UNSTIRRED else None
+
+
+def is_noisy(naming: Naming, excess: Excess) -> bool:
+    """Whether more noise is left than any healthy day leaves."""
+    return excess.score > (NOISY if naming.fit.terms else VERY_NOISY)
+
+
+def _patchwork(naming: Naming) -> bool:
+    """Whether passing effects were pieced together on the same signals: nothing known fits."""
+    comparison = naming.whitener.comparison
+    passing = [
+        instrument
+        for term in naming.fit.terms
+        if term.interval != ALWAYS
+        for instrument in comparison.affected(comparison.station, term.instrument)
+    ]
+    return len(passing) != len(set(passing))
+
+
+def verdict_of(
+    naming: Naming,
+    equal: list[tuple[int, Alternative]],
+    remainder: Remainder,
+    detectable: Mapping[str, tuple[float, str, float]],
+    located_p: float,
+    excess: Excess,
+) -> Verdict:
+    """The verdict on a naming, before its findings are proved one by one.
+
+    Args:
+        naming: The explanation.
+        equal: Explanations that fit as well.
+        remainder: What it leaves.
+        detectable: Smallest detectable sizes: value, unit, in units of the smallest of interest.
+        located_p: Probability, on a healthy day, of the strongest region without any effect.
+        excess: Noise over that of healthy days.
+    """
+    p, share = remainder.p, remainder.share
+    if is_noisy(naming, excess):
+        return "unknown"
+    if not naming.fit.terms:
+        if remainder.is_structure:
+            return "unknown"
+        sizes = sorted(size for _, _, size in detectable.values())
+        if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
+            return "inconclusive"
+        return "none"
+    asked_for = located_p <= REMAINDER_P or naming.gain > CERTAIN_GAIN
+    if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
+        return "none"
+    sizeable = share > max(REMAINDER_SHARE / max(remainder.score, 1e-9), LEAST_REMAINDER)
+    bent = any(len(term.effect.parameters) >= FREELY_BENT for term in naming.fit.terms)
+    counts = (p < REMAINDER_P and sizeable) or (p < BENT_REMAINDER_P and bent)
+    if (remainder.score > REMAINDER_SCORE and counts) or _patchwork(naming):
+        return "unknown"
+    return "ambiguous" if equal else "named"

@@ -1,0 +1,130 @@
+"""Whether the data bear out what is said of each effect."""
+
+from __future__ import annotations
+
+import math
+
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS
+from wind_sensors.diagnosis.explaining.moments import needs_to_be_steady
+from wind_sensors.diagnosis.proving.findings import Finding
+
+SHOWN_P = 0.05
+"""An effect shows if a healthy day has a mismatch as clear where it acts with less probability."""
+
+LEAST_REMOVED = 0.7
+"""Share of the excess misfit that held-out blocks must lose to what is named."""
+
+LEAST_NOISY_REMOVED = 0.5
+NOISE_LEFT = 1.1
+"""The same where an effect comes with noise of its own, which is another one in other blocks, if no
+more is left than so many times the noise of a healthy day."""
+
+MOST_SHARED = 1.5
+"""Largest sum of what two effects on the same signals bring, each in the other's presence, over
+what they bring together."""
+
+OWN_SHARE = 0.5
+"""An effect with this share of the misfit stands out without a region of its own: a delay moves
+nothing up or down."""
+
+UNSEEN_GAIN = 100.0
+UNSEEN_NOISY_GAIN = 200.0
+"""What begins or ends inside the record and brings more need not stand out in a region: what
+changes the quick part of a signal moves none up or down. The second of what acts now and then
+only, and so need not gain all the time."""
+
+PASSING_P = 0.02
+"""It stands out below this probability: of the many intervals that were tried one fits a gust."""
+
+SURE_GAIN = 50.0
+SURE_SIZE = 3.0
+"""What brings so much and is so many of the smallest sizes worth reporting is there, whatever the
+intervals of its parameters say."""
+
+
+def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) -> bool:
+    """Whether several effects were put together that the data do not show one by one.
+
+    One of them stands out nowhere, or each has to make good what the other does to the same
+    signals.
+
+    Args:
+        findings: What is said.
+        comparison: The recording.
+        gain: Drop of the cost by all of it.
+    """
+    own = [f for f in findings if f.proof is not None]
+    if len(own) < 2:
+        return False
+    if any(f.p > SHOWN_P and f.share < OWN_SHARE for f in own):
+        return True
+    reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
+    together = bool(set.intersection(*reached))
+    return together and sum(f.gain for f in own) > MOST_SHARED * gain
+
+
+def passes_unseen(findings: tuple[Finding, ...]) -> bool:
+    """Whether something is said to begin or end inside the record that stands out nowhere.
+
+    Of the many intervals some fit the swings of a healthy vane; but none brings much.
+    """
+    return any(
+        f.term.interval != ALWAYS
+        and not f.term.effect.legible
+        and f.proof is not None
+        and not _shows(f)
+        and f.gain < (UNSEEN_GAIN if needs_to_be_steady(f.term) else UNSEEN_NOISY_GAIN)
+        for f in findings
+    )
+
+
+def borne_out(findings: tuple[Finding, ...]) -> bool:
+    """Whether blocks that were not fitted speak for the findings.
+
+    What acts in a few minutes or in one sector may show in the fitted blocks only, or only in the
+    others: it has to stand out instead, and do there what the next-best explanation does.
+    """
+    proof = next((f.proof for f in findings if f.proof is not None), None)
+    if proof is None or proof.excess_removed > LEAST_REMOVED:
+        return True
+    noisy = any(f.term.effect.noisy for f in findings)
+    if noisy and proof.after < NOISE_LEFT and proof.excess_removed > LEAST_NOISY_REMOVED:
+        return True
+    seldom = any(f.term.interval != ALWAYS or f.term.effect.occasional for f in findings)
+    rival = -math.inf if proof.placebo_removed is None else proof.placebo_removed
+    return seldom and stands_out(findings) and proof.excess_removed >= max(rival, 0.0)
+
+
+def determined(findings: tuple[Finding, ...]) -> bool:
+    """Whether the data tell, of every effect named, at least one size that is not nought.
+
+    Of a vane out of balance on a mast at rest they tell the product with the lean, so that neither
+    has a narrow interval; what brings much and is large is not nought for all that.
+    """
+    return all(
+        _has_a_size(f) or (f.gain > SURE_GAIN and f.term.relative_size > SURE_SIZE)
+        for f in findings
+        if f.proof is not None
+    )
+
+
+def _has_a_size(finding: Finding) -> bool:
+    effect = finding.term.effect
+    graded = [
+        p for p in effect.parameters if p.graded and p.minimum > 0.0
+    ]
+    if effect.size is not None or not graded:
+        return True
+    known = [(p.healthy or 0.0, finding.parameters.get(p.name)) for p in graded]
+    return any(e is None or not e.low <= healthy <= e.high for healthy, e in known)
+
+
+def stands_out(findings: tuple[Finding, ...]) -> bool:
+    """Whether the data show a mismatch where one of the findings acts."""
+    return any(_shows(f) for f in findings)
+
+
+def _shows(finding: Finding) -> bool:
+    passing = finding.term.interval != ALWAYS and not finding.term.effect.legible
+    return finding.p < (PASSING_P if passing else SHOWN_P)
