@@ -20,6 +20,14 @@ BELOW = {
 }
 """For each inner room the rooms that it may import."""
 
+EARLIER = {
+    "comparing": {"effects"},
+    "healthy": {"comparing", "effects", "explaining"},
+    "explaining": {"comparing", "effects", "healthy", "regions"},
+    "proving": {"comparing", "effects", "healthy", "regions", "explaining"},
+}
+"""For each step of a diagnosis what it may import: nothing that comes after it."""
+
 OUTER = {"recordings", "report", "nodes", "cli"}
 FOUNDATION = {"errors", "compiled"}
 FOREIGN = {"rclpy", "rosbags", "matplotlib", "rich"}
@@ -64,6 +72,20 @@ def test_inner_rooms_import_downwards_only(room: str) -> None:
                 wrong.append(f"{path.relative_to(PACKAGE)} imports {name}")
             if parts[0] in FOREIGN:
                 wrong.append(f"{path.relative_to(PACKAGE)} imports {name}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("step", sorted(EARLIER))
+def test_steps_of_a_diagnosis_know_nothing_of_later_ones(step: str) -> None:
+    allowed = EARLIER[step] | {step}
+    files = sorted((PACKAGE / "diagnosis" / step).rglob("*.py"))
+    assert files
+    wrong = [
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if name.startswith("wind_sensors.diagnosis.") and name.split(".")[2] not in allowed
+    ]
     assert wrong == []
 
 

@@ -9,6 +9,6 @@
 - `proving`: whether data that were not fitted bear that out, and what is said.
 
 Other references have rooms of their own, with the same verdicts: `means` (ten-minute records),
-`counts` (pulses without a reference), `latent` (the earth wind behind a moving platform) and `watch`
-(live).
+`counts` (pulses without a reference), `latent` (the earth wind behind a moving platform) and
+`watch` (live).
 """

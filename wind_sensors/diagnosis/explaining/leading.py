@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
 )
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
+    EQUAL_LIKELIHOOD,
     EQUAL_SHARE,
     Judged,
     evidence,
@@ -26,7 +27,6 @@ from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit
 from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.whitening import Whitener
-from wind_sensors.diagnosis.proving.findings import EQUAL_LIKELIHOOD
 from wind_sensors.diagnosis.regions import region_bank
 
 STANDS_OUT = 0.05

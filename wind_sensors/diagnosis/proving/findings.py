@@ -10,16 +10,18 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.acceptance import passing_gain
-from wind_sensors.diagnosis.explaining.explanation import EQUAL_SHARE, Alternative, Naming
+from wind_sensors.diagnosis.explaining.explanation import (
+    EQUAL_LIKELIHOOD,
+    EQUAL_SHARE,
+    Alternative,
+    Naming,
+)
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.proving.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, strongest
 
 FloatArray = npt.NDArray[np.float64]
-
-EQUAL_LIKELIHOOD = 3.0
-"""Explanations whose log-likelihoods lie closer are reported together."""
 
 LEAST_LIKENESS = 0.6
 """Cosine between the white corrections of two explanations of the same thing."""
