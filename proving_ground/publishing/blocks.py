@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from proving_ground.minimum_sizes import MINIMUM_SIZES
@@ -31,6 +32,9 @@ from proving_ground.sealing.strata import SHARES
 
 FILES = (SCORE, ORACLE, TWINS, PEERS, REAL)
 EARLIER = "earlier"
+VERSIONS = 8
+"""So many of the newest versions stand beside each other on the page; all of them are kept."""
+
 MISSING = "Not measured yet."
 PARTS = (
     "about", "rates", "strata", "doses", "coverage", "failures",
@@ -85,16 +89,27 @@ def size_lines() -> list[str]:
 
 
 def version_lines(cards: Sequence[tuple[str, Card]]) -> list[str]:
-    """The promised rates of every version that was scored as a table."""
+    """The promised rates of the newest versions, one by one and together, as a table."""
     if not cards:
         return [MISSING]
-    names = " | ".join(name for name, _ in cards)
-    lines = [f"| what | {names} |", "|---" * (len(cards) + 1) + "|"]
-    return lines + [
-        f"| {rows[0].title} | " + " | ".join(map(_brief, rows)) + " |"
-        for rows in zip(*(card.rates for _, card in cards), strict=True)
-    ]
+    newest = cards[-VERSIONS:]
+    names = " | ".join(name for name, _ in newest)
+    lines = [f"| what | {names} | together | promised |", "|---" * (len(newest) + 3) + "|"]
+    for rows in zip(*(card.rates for _, card in newest), strict=True):
+        told = " | ".join(map(_brief, rows))
+        lines.append(f"| {rows[0].title} | {told} | {_together(rows)} | {rows[-1].promised} |")
+    return lines
 
 
 def _brief(rate: Rate) -> str:
     return f"{100 * rate.value:.0f} % ({rate.hits}/{rate.total})" if rate.total else ""
+
+
+def _together(rates: Sequence[Rate]) -> str:
+    """The rate in all sets, with its interval."""
+    hits, total = sum(r.hits for r in rates), sum(r.total for r in rates)
+    rate = replace(rates[-1], hits=hits, total=total)
+    if not total:
+        return ""
+    low, high = rate.interval
+    return f"{_brief(rate)}, {100 * low:.0f} to {100 * high:.0f} %"
