@@ -106,7 +106,7 @@ def _brief(rate: Rate) -> str:
 
 
 def _together(rates: Sequence[Rate]) -> str:
-    """The rate in all sets, with its interval."""
+    """The rate in these sets taken together, with its interval."""
     hits, total = sum(r.hits for r in rates), sum(r.total for r in rates)
     rate = replace(rates[-1], hits=hits, total=total)
     if not total:

@@ -108,15 +108,15 @@ class Comparison:
     def view(self) -> View:
         """How the recording and its simulations are looked at."""
         return View(
-            self.station,
-            self.grid,
-            self.channels,
-            self.direction,
-            self.speed,
-            self.wind_from,
-            self.mask,
-            self.expected,
-            self.departure,
+            station=self.station,
+            grid=self.grid,
+            channels=self.channels,
+            direction=self.direction,
+            speed=self.speed,
+            wind_from=self.wind_from,
+            mask=self.mask,
+            expected=self.expected,
+            departure=self.departure,
         )
 
     def within(self, mask: FloatArray) -> Comparison:
