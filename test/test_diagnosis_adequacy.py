@@ -222,6 +222,7 @@ LATE = ("timestamp_latency", "vane")
         ((OFFSET, LATE), (100.0, 90.0), (0.002, 0.002), False),
         ((OFFSET, ASYMMETRY), (60.0, 30.0), (0.002, 0.4), True),
         ((OFFSET, LATE), (40.0, 70.0), (0.002, 0.4), False),
+        ((OFFSET, LATE), (60.0, 45.0), (0.002, 0.4), True),
         ((OFFSET,), (100.0,), (0.4,), False),
     ],
 )
@@ -237,6 +238,16 @@ def test_two_effects_must_stand_out_one_by_one(
         for e, g, p in zip(effects, gains, ps, strict=True)
     )
     assert made_up(found, comparison, 100.0) is verdict
+
+
+@pytest.mark.parametrize(("other", "verdict"), [(LATE, False), (ASYMMETRY, True)])
+def test_alone_on_its_signals_an_effect_that_brings_much_stands_out_nowhere(
+    other: tuple[str, str], verdict: bool
+) -> None:
+    found = tuple(
+        replace(_finding(*e, 0.4, p), gain=60.0) for e, p in ((OFFSET, 0.002), (other, 0.4))
+    )
+    assert made_up(found, prepare(recorded(STATION, 65)), 120.0) is verdict
 
 
 @pytest.mark.parametrize(

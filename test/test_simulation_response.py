@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from wind_sensors.errors import UserError
 from wind_sensors.motion import rotations
 from wind_sensors.motion.platform_track import Motion
-from wind_sensors.simulation import Drive, respond
+from wind_sensors.simulation import Drive, ResponseState, respond
 from wind_sensors.station.model import (
     Bivane,
     Change,
@@ -135,6 +135,24 @@ def test_a_vane_on_a_turning_unbalanced_mount_follows_its_equation():
     assert np.abs(error).max() < 1e-3
 
 
+def test_a_bearing_that_catches_holds_the_vane_at_one_heading_only():
+    """The wind turns by 40 degrees in 80 s; friction h_c^2 balances h^2 sin(deviation)."""
+    turning = np.radians(np.linspace(-20.0, 20.0, 1600))
+    wind = -5.0 * np.stack((np.cos(turning), np.sin(turning), 0.0 * turning), axis=1)
+    drive = Drive(START, 0.05, wind)
+    caught = vane(catch_speed=1.5, catch_heading_deg=3.0, catch_width_deg=2.0, damping_ratio=0.7)
+    free = vane(damping_ratio=0.7)
+    angle, expected = (
+        np.degrees(respond(Station(instruments=(v,)), drive).angles["vane"].angle)
+        for v in (caught, free)
+    )
+    behind = expected - angle
+    held = np.degrees(np.arcsin(1.5**2 / 5.0**2))
+    assert behind.max() == pytest.approx(held, rel=0.1)
+    far = np.abs(angle - 3.0) > 8.0
+    assert np.abs(behind[far]).max() < 0.1
+
+
 def test_finer_sampling_of_the_same_wind_gives_the_same_movement():
     coarse = gusty(count=800)
     fine_time = np.arange(799 * 8 + 1) * coarse.dt / 8
@@ -190,6 +208,19 @@ def test_three_fixed_propellers_with_cosine_response_show_the_wind_vector():
     rates = [r.y[-1] for r in respond(station, steady(wind, 4000)).rotors.values()]
     np.testing.assert_allclose(axes.T @ np.array(rates), wind, atol=2e-3)
     assert min(rates) < 0.0, "a propeller whose axis faces the other way turns backwards"
+
+
+@pytest.mark.parametrize(
+    "rotor", [propeller(axis=(1.0, 0.0, 0.0), mu2=-0.7), cup(mu1=1.2, a4=1.0), cup(mu1=1.2)]
+)
+def test_air_from_behind_brakes_a_rotor_and_never_drives_it_on(rotor):
+    """Of which the models say nothing: a multirotor's stuck vane, a cup that falls fast."""
+    wind = (-6.0, 2.0, 0.0) if isinstance(rotor, Propeller) else (0.1, 0.0, -12.0)
+    turning = ResponseState(rotors={rotor.name: (100.0, 0.0)})
+    y = respond(Station(instruments=(rotor,)), steady(wind), turning).rotors[rotor.name].y
+    assert y[0] > 0.0
+    assert np.all(np.diff(y) <= 0.0)
+    assert y[-1] < 0.05 * y[0]
 
 
 def test_a_propeller_that_is_neither_mounted_nor_aimed_is_the_users_error():

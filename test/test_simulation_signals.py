@@ -332,6 +332,27 @@ def test_a_filter_lags_a_ramp_by_its_time_constant():
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
+def test_play_lets_the_reading_rest_until_it_is_taken_up():
+    t = 0.05 * np.arange(401)
+    found = np.degrees(read(vane(play_deg=8.0), np.radians(20.0) * np.sin(2.0 * np.pi * t / 10.0)))
+    turned = 20.0 * np.sin(2.0 * np.pi * t / 10.0)
+    later = t > 2.5
+    assert np.abs(found - turned).max() <= 4.0 + 1e-9
+    assert found[later].max() == pytest.approx(16.0, abs=0.01)
+    assert found[later].min() == pytest.approx(-16.0, abs=0.01)
+    rests = later & (np.abs(np.diff(found, prepend=0.0)) < 1e-9)
+    # Back by 8 degrees of 20: it rests while the sine falls from 1 to 0.6.
+    period = (t > 5.0) & (t < 15.0)
+    assert np.mean(rests[period]) == pytest.approx(np.arccos(0.6) / np.pi, abs=0.02)
+
+
+def test_a_logger_that_refuses_to_turn_faster_ramps_after_a_jump():
+    t = 0.05 * np.arange(200)
+    jumping = np.radians(np.where(t < 2.0, 170.0, 230.0))
+    found = np.degrees(np.unwrap(read(vane(slew_limit_deg_s=20.0), jumping)))
+    np.testing.assert_allclose(found, np.clip(170.0 + 20.0 * (t - 1.95), 170.0, 230.0), atol=1e-6)
+
+
 def test_latency_shows_the_heading_of_an_earlier_time():
     t = 0.05 * np.arange(400)
     angle = np.sin(0.8 * t)
@@ -360,7 +381,8 @@ def test_noise_has_its_size_and_belongs_to_the_sample():
 
 def test_an_encoder_fed_in_blocks_gives_what_it_gives_at_once():
     v = vane(
-        filter_time_constant=0.4, noise_deg=1.0, eccentricity_deg=5.0,
+        filter_time_constant=0.4, noise_deg=1.0, eccentricity_deg=5.0, play_deg=6.0,
+        slew_limit_deg_s=60.0,
         outages=(Outage(start=4.5, stop=6.2),),
     )  # fmt: skip
     station = Station(

@@ -58,6 +58,7 @@ from wind_sensors.diagnosis.proving.support import (
     passes_unseen,
     stands_out,
 )
+from wind_sensors.diagnosis.proving.suspicions import suspicion_of
 from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
@@ -194,6 +195,7 @@ def _upheld(
     comparison: Comparison,
     station: Station,
     structured: bool,
+    workers: int,
 ) -> tuple[Verdict, tuple[Finding, ...], str]:
     """Verdict and findings after what speaks against them, and what does, for people.
 
@@ -223,6 +225,8 @@ def _upheld(
         objection = "with another size on one signal than on another"
     elif not determined(findings):
         objection = "of any size, nought among them"
+    elif (suspicion := suspicion_of(naming, station, workers)) is not None:
+        left, objection = "unknown", suspicion.words
     else:
         return verdict, findings, ""
     return left, (), f"{names} would fit, but {objection}"
@@ -288,10 +292,14 @@ def diagnose(
     report("proving")(1.0)
     structured = located(naming, bank, comparison, baseline).is_structure
     verdict, findings, objection = _upheld(
-        verdict, findings, naming, comparison, baseline.station, structured
+        verdict, findings, naming, comparison, baseline.station, structured, workers
     )
     if calm and verdict == "unknown":
         verdict = "inconclusive"
+    if verdict == "unknown" and not objection:
+        suspicion = suspicion_of(naming, baseline.station, workers)
+        if suspicion is not None:
+            objection = f"{suspicion.words} than {suspicion.effect}"
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)

@@ -47,8 +47,9 @@ def write_regressors(recording: Path, target: Path, workers: int = 1) -> None:
     """
     comparison = prepare(read_recording(recording))
     station = comparison.station
-    templates = templates_of(comparison, station, catalogue())
-    bank = signature_bank(comparison, station, templates, workers)
+    bank = signature_bank(
+        comparison, station, templates_of(comparison, station, catalogue()), workers
+    )
     names = [c.name for c in comparison.channels]
     measured = np.concatenate([comparison.measured.series[n] for n in names])
     without = np.concatenate([bank.without.series[n] for n in names])
@@ -57,8 +58,8 @@ def write_regressors(recording: Path, target: Path, workers: int = 1) -> None:
         target,
         residual=measured - without,
         signatures=np.stack(with_each, axis=1) - without[:, None],
-        effects=np.array([t.effect.name for t in templates]),
-        sizes=np.array([t.effect.relative_size(t.values) for t in templates]),
+        effects=np.array([t.effect.name for t in bank.templates]),
+        sizes=np.array([t.effect.relative_size(t.values) for t in bank.templates]),
         channel=np.repeat(np.arange(len(names)), comparison.grid.n),
     )
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
+from wind_sensors.compiled import compiled
 from wind_sensors.motion.frames import wrap
 from wind_sensors.simulation import random_numbers
 from wind_sensors.simulation.clocks import measured_seconds
@@ -42,6 +45,31 @@ def angle_at(movement: AngleResponse, dt: float, seconds: FloatArray) -> FloatAr
     return value
 
 
+@compiled
+def _behind_play(angle: FloatArray, start: float, half: float) -> FloatArray:
+    """What a shaft with a free angle of two halves shows of another's angle, shape (n,)."""
+    out = np.empty(angle.size)
+    shaft = start
+    for i in range(angle.size):
+        shaft = min(max(shaft, angle[i] - half), angle[i] + half)
+        out[i] = shaft
+    return out
+
+
+@compiled
+def _no_faster(time: FloatArray, angle: FloatArray, start: float, fastest: float) -> FloatArray:
+    """Readings that follow an angle the shorter way round, no faster than so many rad/s, (n,)."""
+    out = np.empty(angle.size)
+    shown = start
+    for i in range(angle.size):
+        most = fastest * (time[i] - time[i - 1]) if i > 0 else 0.0
+        jump = angle[i] - shown
+        jump -= 2.0 * math.pi * math.floor((jump + math.pi) / (2.0 * math.pi))
+        shown += min(max(jump, -most), most)
+        out[i] = shown
+    return out
+
+
 class AngleEncoder:
     """Sensor and logger of one vane axis; keeps its state between responses.
 
@@ -57,7 +85,9 @@ class AngleEncoder:
         self._origin = origin
         self._seed = seed
         self._samples = first_sample
+        self._shaft: float | None = None
         self._filtered: float | None = None
+        self._shown: tuple[float, float] | None = None
         self._held: float | None = None
 
     def readings(self, response: Response, stamped: TimeArray) -> FloatArray:
@@ -79,22 +109,36 @@ class AngleEncoder:
                 stop = int(np.searchsorted(since, stretch.segment.stop - 1e-9))
             stop = max(stop, done)
             here = slice(done, stop)
-            part = self._through_filter(vane, movement, response.drive.dt, stretch)
+            turned = self._behind_coupling(vane, movement, stretch)
+            part = self._through_filter(vane, turned, response.drive.dt)
             begin = response.drive.elapsed + stretch.first * response.drive.dt
             angle = angle_at(part, response.drive.dt, since[here] - begin)
-            out[here] = self._held_in_outages(
+            read = self._not_too_fast(
                 vane, since[here], self._read(vane, angle, numbers[here])
             )
+            out[here] = self._held_in_outages(vane, since[here], read)
             done = stop
         self._samples += stamped.shape[0]
         return out
 
-    def _through_filter(
-        self, vane: Angle, movement: AngleResponse, dt: float, stretch: Stretch
+    def _behind_coupling(
+        self, vane: Angle, movement: AngleResponse, stretch: Stretch
     ) -> AngleResponse:
-        """The sensed angle after the logger's low-pass filter, exact for a linear course."""
+        """Movement of the sensor's shaft in one stretch."""
         here = slice(stretch.first, stretch.last + 1)
         angle, rate = movement.angle[here], movement.rate[here]
+        half = 0.5 * np.radians(vane.play_deg)
+        if half == 0.0:
+            self._shaft = None
+            return AngleResponse(angle, rate)
+        start = float(angle[0]) if self._shaft is None else self._shaft
+        shaft = _behind_play(angle, start, half)
+        self._shaft = float(shaft[-1])
+        return AngleResponse(shaft, np.where(np.abs(angle - shaft) >= half, rate, 0.0))
+
+    def _through_filter(self, vane: Angle, movement: AngleResponse, dt: float) -> AngleResponse:
+        """The sensed angle after the logger's low-pass filter, exact for a linear course."""
+        angle, rate = movement.angle, movement.rate
         if "/" not in self._name:
             amplitude = np.radians(vane.eccentricity_deg)
             if amplitude != 0.0:
@@ -134,6 +178,23 @@ class AngleEncoder:
             origin = np.radians(vane.quantisation_origin_deg)
             angle = np.rint(wrap(angle - origin) / step) * step + origin
         return wrap(angle)
+
+    def _not_too_fast(
+        self, vane: Angle, since: FloatArray, readings: FloatArray
+    ) -> FloatArray:
+        """Readings as a logger passes them on that refuses to turn faster than so much."""
+        fastest = np.radians(vane.slew_limit_deg_s)
+        if fastest == 0.0 or readings.size == 0:
+            self._shown = None
+            return readings
+        time, start = since, float(readings[0])
+        if self._shown is not None:
+            before, start = self._shown
+            time = np.concatenate(([before], since))
+            readings = np.concatenate(([start], readings))
+        shown = _no_faster(time, readings, start, float(fastest))
+        self._shown = (float(time[-1]), float(shown[-1]))
+        return wrap(shown[-since.size :])
 
     def _over_gap(
         self, vane: Angle, angle: FloatArray, numbers: npt.NDArray[np.int64]

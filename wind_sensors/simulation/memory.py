@@ -16,7 +16,7 @@ from wind_sensors.simulation.drive import Drive
 _Result = TypeVar("_Result")
 
 FLOWS = 8
-MOVEMENTS = 8
+MOVEMENTS = 16
 """How many are kept: those of the station tried last, and of some before."""
 
 

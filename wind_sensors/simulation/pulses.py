@@ -23,21 +23,28 @@ TimeArray = npt.NDArray[np.int64]
 CLOSE = 1e-6
 """A Newton step this small leaves an error of the order of its square, far below a nanosecond."""
 
+GENTLE = 0.03
+"""A cubic whose slope changes by less than this share between its ends is within 1e-9 of its
+crossing after one step of third order (Halley's) from a straight line."""
+
 
 @compiled
-def _crossing(p_0: float, p_1: float, slope_0: float, slope_1: float, level: float) -> float:
-    """Where in [0, 1] a cubic with given ends and end slopes passes a level between its ends.
+def _crossing(
+    rise: float, slope_0: float, c_2: float, c_3: float, gentle: bool, level: float
+) -> float:
+    """Where in [0, 1] the cubic slope_0 u + c_2 u^2 + c_3 u^3 passes a level between 0 and `rise`.
 
-    Newton's method inside a shrinking bracket; slopes are per unit interval.
+    One step where the cubic is gentle, else Newton's method inside a shrinking bracket.
     """
+    u = level / rise
+    if gentle:
+        per_slope = 1.0 / (slope_0 + u * (2.0 * c_2 + 3.0 * u * c_3))
+        step = (u * (slope_0 + u * (c_2 + u * c_3)) - level) * per_slope
+        return u - step * (1.0 + step * (c_2 + 3.0 * u * c_3) * per_slope)
     low, high = 0.0, 1.0
-    rising = p_1 > p_0
-    u = (level - p_0) / (p_1 - p_0)
-    c_2 = 3.0 * (p_1 - p_0) - 2.0 * slope_0 - slope_1
-    c_3 = -2.0 * (p_1 - p_0) + slope_0 + slope_1
     for _ in range(60):
-        value = p_0 + u * (slope_0 + u * (c_2 + u * c_3)) - level
-        if (value > 0.0) == rising:
+        value = u * (slope_0 + u * (c_2 + u * c_3)) - level
+        if (value > 0.0) == (rise > 0.0):
             high = u
         else:
             low = u
@@ -53,24 +60,31 @@ def _crossing(p_0: float, p_1: float, slope_0: float, slope_1: float, level: flo
 
 @compiled
 def _edges_of(
-    psi: FloatArray, rate: FloatArray, dt: float, slot_angles: FloatArray
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    psi: FloatArray,
+    rate: FloatArray,
+    dt: float,
+    slot_angles: FloatArray,
+    start: int,
+    before: float,
+) -> tuple[TimeArray, npt.NDArray[np.int64]]:
     """Times at which slots pass the sensor, and the running number of each slot.
 
     Args:
         psi, rate: Rotor angle [rad] and rate [rad/s] every dt, shape (m,).
         dt: [s].
         slot_angles: Angle of each slot within a turn [rad], shape (slots,).
+        start: Time from which `before` counts [ns].
+        before: When the first sample is [s].
 
     Returns:
-        Times since the first sample [s], numbers (slot + slots * turn); in order of time.
+        Times [ns], numbers (slot + slots * turn); in order of time.
     """
     slots = slot_angles.shape[0]
     width = 2.0 * math.pi / slots
     room = 16
     for i in range(psi.shape[0] - 1):
         room += int(abs(psi[i + 1] - psi[i]) / width) + 3
-    times = np.empty(room)
+    times = np.empty(room, dtype=np.int64)
     numbers = np.empty(room, dtype=np.int64)
     count = 0
     known = False
@@ -82,6 +96,11 @@ def _edges_of(
         a, b = psi[i], psi[i + 1]
         if a == b:
             continue
+        rise = b - a
+        slope_0, slope_1 = rate[i] * dt, rate[i + 1] * dt
+        c_2 = 3.0 * rise - 2.0 * slope_0 - slope_1
+        c_3 = slope_0 + slope_1 - 2.0 * rise
+        gentle = abs(c_2) + 3.0 * abs(c_3) < GENTLE * min(abs(slope_0), abs(slope_1))
         if b > a:
             # Rotors seldom turn back: the next slot ahead is remembered.
             if not known:
@@ -96,8 +115,8 @@ def _edges_of(
                     ahead += 1
                 known = True
             while ahead_level <= b:
-                u = _crossing(a, b, rate[i] * dt, rate[i + 1] * dt, ahead_level)
-                times[count] = (i + u) * dt
+                u = _crossing(rise, slope_0, c_2, c_3, gentle, ahead_level - a)
+                times[count] = start + int(np.rint(((i + u) * dt + before) * 1e9))
                 numbers[count] = ahead
                 count += 1
                 ahead += 1
@@ -115,8 +134,8 @@ def _edges_of(
             if level < b:
                 break
             if level < a:
-                u = _crossing(a, b, rate[i] * dt, rate[i + 1] * dt, level)
-                times[count] = (i + u) * dt
+                u = _crossing(rise, slope_0, c_2, c_3, gentle, level - a)
+                times[count] = start + int(np.rint(((i + u) * dt + before) * 1e9))
                 numbers[count] = number
                 count += 1
             number -= 1
@@ -236,11 +255,10 @@ class PulseCircuit:
             rotor = stretch.segment.station.instrument(self._name)
             assert isinstance(rotor, Rotor)
             here = slice(stretch.first * movement.nodes, stretch.last * movement.nodes + 1)
-            seconds, numbers = _edges_of(
-                movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor)
-            )
-            seconds = seconds + stretch.first * drive.dt
-            times = drive.start_ns + np.rint(seconds * 1e9).astype(np.int64)
+            times, numbers = _edges_of(
+                movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor),
+                drive.start_ns, stretch.first * drive.dt,
+            )  # fmt: skip
             end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
             out.append((rotor, times, numbers, end))
         return out

@@ -359,11 +359,17 @@ class _Worker:
         parameters = rotor_parameters(rotor)
         start = self._start.rotors.get(rotor.name, (np.nan, 0.0))
         numbers = tuple(v for v in parameters if not isinstance(v, np.ndarray))
+        axes_key = self._axes_key(rotor)
         key = (
             numbers, parameters.angular_response.tobytes(), rotor.reference_density,
-            self._nodes[rotor.name], self._start.rotors.get(rotor.name), self._axes_key(rotor),
+            self._nodes[rotor.name], self._start.rotors.get(rotor.name), axes_key,
         )  # fmt: skip
-        y, turned = self._known(key, lambda: self._rotated(rotor, parameters, start))
+
+        def rotated() -> tuple[FloatArray, FloatArray]:
+            axes = self._known(("axes", axes_key), lambda: self._axes(rotor))
+            return self._rotated(rotor, parameters, start, axes)
+
+        y, turned = self._known(key, rotated)
         if not np.isfinite(y[-1]):
             raise UserError(
                 f"'{rotor.name}' runs away: its torque grows with its rate.",
@@ -396,9 +402,13 @@ class _Worker:
         return _fixed_axes(rotor, self._winds.flow(rotor))
 
     def _rotated(
-        self, rotor: Cup | Propeller, parameters: RotorParameters, start: tuple[float, float]
+        self,
+        rotor: Cup | Propeller,
+        parameters: RotorParameters,
+        start: tuple[float, float],
+        axes: tuple[FloatArray, FloatArray, FloatArray],
     ) -> tuple[FloatArray, FloatArray]:
-        axial, transverse, lateral = self._axes(rotor)
+        axial, transverse, lateral = axes
         temperature = self._drive.temperature
         if temperature is None:
             temperature = np.full(axial.shape, rotor.reference_temperature)

@@ -250,6 +250,8 @@ class Angle(Instrument):
     """h_f [m/s]: the vane sticks while h^2 |sin(deviation)| < h_f^2."""
     imbalance: float = 0.0
     """b [1/m]: angular acceleration per acceleration across the nose."""
+    play_deg: NonNegative = 0.0
+    """Free angle of the coupling: the sensor follows the vane once that is taken up."""
     offset_deg: float = 0.0
     """Reading minus heading, counter-clockwise (mounting offset)."""
     reversed: bool = False
@@ -270,6 +272,8 @@ class Angle(Instrument):
     """None: the reading stays at the nearest edge of the gap; `floating`: it may be anything."""
     filter_time_constant: NonNegative = 0.0
     """First-order low-pass on the angle [s]."""
+    slew_limit_deg_s: NonNegative = 0.0
+    """Fastest turn of the reading that the logger passes on; 0: any."""
     noise_deg: NonNegative = 0.0
     """Standard deviation of one reading's noise."""
 
@@ -281,6 +285,12 @@ class Vane(Angle):
     """The kind of the instrument."""
     joint_states: Input
     """Topic of the nose's heading, counter-clockwise from the sensor's x axis."""
+    catch_speed: NonNegative = 0.0
+    """h_c [m/s]: friction added (h_c^2 to h_f^2) where the race catches, at one heading."""
+    catch_heading_deg: float = 0.0
+    """That heading, counter-clockwise from the sensor's x axis."""
+    catch_width_deg: Positive = 5.0
+    """Standard width of the place."""
 
 
 class Bivane(Angle):

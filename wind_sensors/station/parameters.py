@@ -16,7 +16,7 @@ from wind_sensors.instruments.dynamics.rotor import (
     RotorParameters,
 )
 from wind_sensors.instruments.dynamics.vane import VaneParameters
-from wind_sensors.station.model import Angle, Cup, Propeller
+from wind_sensors.station.model import Angle, Cup, Propeller, Vane
 
 _NO_TABLE = np.ones(RESPONSE_TABLE_SIZE)
 
@@ -82,7 +82,7 @@ def rotor_parameters(rotor: Cup | Propeller) -> RotorParameters:
 
 def vane_parameters(vane: Angle) -> VaneParameters:
     """Arguments of the vane equation for a vane (or one axis of a bivane) of the station."""
-    return VaneParameters(
+    parameters = VaneParameters(
         distance_constant=vane.distance_constant,
         damping_ratio=vane.damping_ratio,
         inertia_factor=vane.inertia_factor,
@@ -90,4 +90,11 @@ def vane_parameters(vane: Angle) -> VaneParameters:
         friction=vane.friction_speed**2,
         imbalance=vane.imbalance,
         aerodynamic_offset=0.0,
+    )
+    if not isinstance(vane, Vane):
+        return parameters
+    return parameters._replace(
+        catch=vane.catch_speed**2,
+        catch_heading=float(np.radians(vane.catch_heading_deg)),
+        catch_width=float(np.radians(vane.catch_width_deg)),
     )

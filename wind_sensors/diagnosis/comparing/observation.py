@@ -55,7 +55,16 @@ class Grid:
 
     def seconds(self, time: TimeArray) -> FloatArray:
         """Seconds since `start`."""
-        return np.asarray((time - self.start) * 1e-9, dtype=np.float64)
+        return _seconds_since(np.asarray(time, dtype=np.int64), self.start)
+
+
+@compiled
+def _seconds_since(time: TimeArray, start: int) -> FloatArray:
+    """Nanoseconds as seconds, without the large temporary arrays of whole-array arithmetic."""
+    out = np.empty(time.size)
+    for i in range(time.size):
+        out[i] = (time[i] - start) * 1e-9
+    return out
 
 
 @dataclass(frozen=True)
@@ -103,8 +112,9 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
     if pulses.turns is not None:
         turns = np.asarray(pulses.turns, dtype=np.float64)
     else:
-        turns = np.arange(time.size) / rotor.pulses_per_revolution
-    if np.any(np.diff(time) < 0.0):
+        turns = np.arange(time.size, dtype=np.float64)
+        turns /= rotor.pulses_per_revolution
+    if np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
         time, turns = time[order], np.sort(turns)
     slots = min(rotor.pulses_per_revolution, time.size - 1)

@@ -167,8 +167,10 @@ class Effect:
 
 def _named(name: str) -> Effect:
     from wind_sensors.diagnosis.effects import catalogue
+    from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 
-    return catalogue()[name]
+    suspects = {effect.name: effect for effect in SUSPECTS}
+    return suspects[name] if name in suspects else catalogue()[name]
 
 
 def entry_of(station: Station, instrument: str) -> Instrument | Platform:

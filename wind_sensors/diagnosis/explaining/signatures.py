@@ -221,27 +221,36 @@ def signature_bank(
     workers: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> SignatureBank:
-    """Simulate every template in a recording's wind."""
-    without = comparison.simulate(station)
-    parts = in_parallel(_planting(comparison, station), templates, workers, progress)
-    with_each = [without.with_others(part) for part in parts]
-    return SignatureBank(templates, without, with_each)
+    """Simulate every template that can be in a recording's wind."""
+    bank = SignatureBank([], comparison.simulate(station), [])
+    return _with_more(bank, comparison, station, templates, workers, progress)
 
 
 def with_larger(
     bank: SignatureBank, comparison: Comparison, station: Station, workers: int = 1
 ) -> SignatureBank:
     """A bank with larger sizes of its effects, as far as they can be simulated."""
+    return _with_more(bank, comparison, station, _larger_templates(bank.templates), workers)
+
+
+def _with_more(
+    bank: SignatureBank,
+    comparison: Comparison,
+    station: Station,
+    templates: list[Template],
+    workers: int,
+    progress: Callable[[float], None] | None = None,
+) -> SignatureBank:
+    """A bank with those of some templates that can be: with which no rotor runs away."""
 
     def tried(template: Template) -> Simulated | None:
         only = comparison.affected(station, template.instrument)
         return comparison.possible(template.planted(station), only)
 
-    larger = _larger_templates(bank.templates)
-    parts = in_parallel(tried, larger, workers)
+    parts = in_parallel(tried, templates, workers, progress)
     possible = [
         (template, bank.without.with_others(part))
-        for template, part in zip(larger, parts, strict=True)
+        for template, part in zip(templates, parts, strict=True)
         if part is not None
     ]
     return SignatureBank(
@@ -249,15 +258,3 @@ def with_larger(
         bank.without,
         [*bank.with_each, *(simulated for _, simulated in possible)],
     )
-
-
-def _planting(
-    comparison: Comparison, station: Station
-) -> Callable[[Template], Simulated]:
-    """What simulates the signals that a template changes."""
-
-    def planted(template: Template) -> Simulated:
-        only = comparison.affected(station, template.instrument)
-        return comparison.simulate(template.planted(station), only=only)
-
-    return planted

@@ -75,10 +75,10 @@ class Evidence:
 
 def evidence_of(comparison: Comparison, baseline: Baseline) -> Evidence:
     """What a healthy recording says about every template."""
-    templates = templates_of(comparison, baseline.station, catalogue())
-    bank = with_larger(
-        signature_bank(comparison, baseline.station, templates), comparison, baseline.station
-    )
+    station = baseline.station
+    own = signature_bank(comparison, station, templates_of(comparison, station, catalogue()))
+    templates = own.templates
+    bank = with_larger(own, comparison, station)
     trust = trust_of(comparison, bank.without, baseline)
     probed = bank.whitened(comparison, trust)
     signatures = in_series(comparison, probed[: len(templates)])

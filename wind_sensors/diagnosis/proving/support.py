@@ -46,8 +46,8 @@ intervals of its parameters say."""
 def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) -> bool:
     """Whether several effects were put together that the data do not show one by one.
 
-    One of them stands out nowhere, or each has to make good what the other does to the same
-    signals.
+    One of them stands out nowhere, though it brings little or not on signals of its own, or each
+    has to make good what the other does to the same signals.
 
     Args:
         findings: What is said.
@@ -57,9 +57,12 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     own = [f for f in findings if f.proof is not None]
     if len(own) < 2:
         return False
-    if any(f.p > SHOWN_P and f.share < OWN_SHARE for f in own):
-        return True
     reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
+    for k, f in enumerate(own):
+        alone = not reached[k] & set().union(*reached[:k], *reached[k + 1 :])
+        sure = alone and f.gain > SURE_GAIN
+        if f.p > SHOWN_P and f.share < OWN_SHARE and not sure:
+            return True
     together = bool(set.intersection(*reached))
     return together and sum(f.gain for f in own) > MOST_SHARED * gain
 

@@ -113,7 +113,7 @@ class SumsJudge:
             bank = signature_bank(comparison, self._station, templates)
         except ValueError:
             return False
-        places = self._registry.places_of(templates)
+        places = self._registry.places_of(bank.templates)
         size = len(self._registry.templates)
         self._test.resize(size)
         trust = self._normal.trust(comparison, bank.without)

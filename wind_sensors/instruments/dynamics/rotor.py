@@ -5,7 +5,7 @@ members (Kristensen (1994), (1), (2), (30); Kristensen et al. (2014), (58), (83)
 
     l0 I dy/dt = rho { (A - y) [a4 B + (1 - a4) y] + e A^2 cos(psi - alpha - psi_e) + E } - F sgn(y)
 
-A is the effective axial forcing, B the wind that sets the torque's slope (B = A for cups,
+A is the effective axial forcing, B the wind that sets the torque's slope (B = |A| for cups,
 B = U g(theta)/g(0) for a propeller), rho the air density relative to the calibration's, I the
 inertia relative to the healthy rotor's, e the once-per-revolution torque of an unequal rotor,
 E the second-order lift of the Kristensen (1994) forms, and F = U_s^2 the bearing friction.
@@ -117,7 +117,8 @@ def rotor_forcing(
             once-per-revolution torque uses it.
 
     Returns:
-        A, B [m/s] and E [m^2/s^2].
+        A, B [m/s] and E [m^2/s^2]. B is the amount of A where the torque's slope follows it: air
+        from behind, of which those models say nothing, brakes a rotor and never drives it on.
     """
     if p.form == CUP_EQUIVALENT:
         h = transverse
@@ -149,7 +150,7 @@ def rotor_forcing(
             forcing = 0.0
     else:
         forcing = forcing + p.starting_speed + p.calibration_offset
-    return forcing, (forcing if slope_is_forcing else slope), lift
+    return forcing, (abs(forcing) if slope_is_forcing else slope), lift
 
 
 STRIBECK_SPEED = 1.0

@@ -42,6 +42,12 @@ class VaneParameters(NamedTuple):
     """b = m r / I [1/m]: angular acceleration per acceleration across the nose."""
     aerodynamic_offset: float
     """Angle at which the fin balances, relative to the wind [rad] (a bent fin)."""
+    catch: float = 0.0
+    """h_c^2 [m^2/s^2]: friction added where the race catches, at one heading."""
+    catch_heading: float = 0.0
+    """That heading [rad]."""
+    catch_width: float = 1.0
+    """Standard width of the place [rad]."""
 
 
 @compiled
@@ -78,6 +84,17 @@ def vane_acceleration(
 
 
 @compiled
+def _grip(p: VaneParameters, phi: float) -> float:
+    """Angular acceleration that the friction withstands at a heading [rad/s^2]."""
+    friction = p.friction
+    if p.catch > 0.0:
+        away = phi - p.catch_heading
+        away -= 2.0 * math.pi * math.floor((away + math.pi) / (2.0 * math.pi))
+        friction += p.catch * math.exp(-0.5 * (away / p.catch_width) ** 2)
+    return friction / (p.distance_constant * p.distance_constant * p.inertia_factor)
+
+
+@compiled
 def advance_vane(
     p: VaneParameters,
     phi: float,
@@ -108,12 +125,12 @@ def advance_vane(
     omega = h_largest / p.distance_constant * math.sqrt(stiffness)
     rate = omega * max(1.0, 2.0 * p.damping_ratio * p.damping_factor * math.sqrt(stiffness))
     substeps = 1 + int(2.0 * dt * rate)
-    if p.friction > 0.0:
+    if p.friction > 0.0 or p.catch > 0.0:
         substeps = max(substeps, 4)
     step = dt / substeps
     yaw_acceleration = (yaw_rate[1] - yaw_rate[0]) / dt
-    friction = p.friction / (p.distance_constant * p.distance_constant * p.inertia_factor)
     for k in range(substeps):
+        friction = _grip(p, phi)
         f_0 = k / substeps
         f_h = (k + 0.5) / substeps
         f_1 = (k + 1.0) / substeps

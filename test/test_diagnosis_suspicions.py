@@ -1,0 +1,60 @@
+"""Faults without an identifier: never named, but what they explain better is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_keys
+from wind_sensors.diagnosis.effects.suspected import SUSPECTS
+from wind_sensors.diagnosis.proving.suspicions import suspicion_of
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.station.signals import Angles, Recording
+
+
+def _behind_play(recording: Recording, play_deg: float) -> Recording:
+    """The recording with a sensor that rests until the vane has turned back by the play."""
+    vane = recording.angles["vane"]
+    half = np.radians(play_deg) / 2.0
+    nose = np.unwrap(vane.angle)
+    shaft = nose.copy()
+    for k in range(1, nose.size):
+        shaft[k] = np.clip(shaft[k - 1], nose[k] - half, nose[k] + half)
+    return replace(recording, angles={"vane": Angles(vane.time, np.angle(np.exp(1j * shaft)))})
+
+
+def test_play_is_no_friction_though_both_hold_the_reading_still() -> None:
+    found = diagnose(_behind_play(recorded(STATION, 66), 14.0), baseline())
+    assert found.verdict == "unknown"
+    assert found.findings == ()
+    assert "play between vane and sensor" in found.unexplained.description
+    suspicion = suspicion_of(found.naming, STATION)
+    assert suspicion is not None
+    assert suspicion.fault.effect.name == "play"
+    assert suspicion.fault.values["play"] == pytest.approx(14.0, rel=0.1)
+
+
+def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings() -> None:
+    seen = recorded(STATION, 67).angles["vane"].angle
+    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen)))))
+    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": 8.0}
+    found = diagnose(recorded(with_keys(STATION, "vane", caught), 67), baseline())
+    assert found.verdict == "unknown"
+    assert "catches at one heading" in found.unexplained.description
+
+
+def test_friction_keeps_its_name_beside_them() -> None:
+    found = diagnosed("vane_friction", "vane", friction_speed=2.5)
+    assert suspicion_of(found.naming, STATION) is None
+    assert found.verdict == "named"
+
+
+def test_suspects_bear_no_name_of_the_catalogue_but_can_be_mistaken_for_some() -> None:
+    for fault in SUSPECTS:
+        assert fault.name not in catalogue()
+        assert fault.confusable
+        assert set(fault.confusable) <= set(catalogue())

@@ -1,0 +1,120 @@
+"""Faults that have no identifier in the catalogue.
+
+They are never named. Where one of them explains a recording better than the effect that would be
+named, that name is withdrawn, and the unknown is described by it. What each can be mistaken for
+stands in its `confusable`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.station.model import Angle, Instrument, Platform, Station, Vane
+
+Entry = Instrument | Platform
+
+
+def _is_vane(entry: Entry, station: Station) -> bool:
+    return isinstance(entry, Angle)
+
+
+def _play(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Angle)
+    return {"play_deg": entry.play_deg + values["play"]}
+
+
+PLAY = Effect(
+    name="play",
+    meaning="play between vane and sensor",
+    entrance="output",
+    equation="the reading rests until the vane has turned back by the play",
+    source="hysteresis of a coupling with a free angle",
+    region="whenever the vane turns back, in any wind",
+    parameters=(Parameter("play", "deg", 0.0, 40.0, minimum=1.0, step=0.3),),
+    applies=_is_vane,
+    update=_play,
+    noisy=True,
+    smooths=True,
+    templates=({"play": 1.0}, {"play": 3.0}, {"play": 8.0}),
+    confusable={
+        "vane_friction": "strong wind: friction fades, play stays",
+        "vane_damping": "turn the vane to and fro by hand",
+        "vane_inertia": "turn the vane to and fro by hand",
+        "low_pass_filter": "turn the vane to and fro by hand, slowly",
+        "timestamp_latency": "turn the vane to and fro by hand, slowly",
+    },
+)
+
+
+def _slew_limit(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Angle)
+    return {"slew_limit_deg_s": values["fastest"]}
+
+
+SLEW_LIMIT = Effect(
+    name="slew_limit",
+    meaning="a reading that may only turn so fast",
+    entrance="output",
+    equation="|d reading/dt| <= fastest",
+    source="a logger or a driver that refuses jumps",
+    region="quick turns; slow ones pass",
+    parameters=(Parameter("fastest", "deg/s", 1.0, 400.0, healthy=None, step=1.0),),
+    applies=_is_vane,
+    update=_slew_limit,
+    noisy=True,
+    smooths=True,
+    templates=({"fastest": 6.0}, {"fastest": 15.0}, {"fastest": 40.0}),
+    confusable={
+        "low_pass_filter": "a jump of the vane by hand: a straight ramp, not a bend",
+        "vane_damping": "a jump of the vane by hand",
+        "vane_inertia": "a jump of the vane by hand",
+        "vane_friction": "a jump of the vane by hand",
+    },
+)
+
+
+
+def _catch(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Vane)
+    return {
+        "catch_speed": values["catch_speed"],
+        "catch_heading_deg": values["heading"],
+        "catch_width_deg": values["width"],
+    }
+
+
+def _turns_about_the_vertical(entry: Entry, station: Station) -> bool:
+    return isinstance(entry, Vane)
+
+
+CATCH = Effect(
+    name="catch",
+    meaning="a bearing that catches at one heading",
+    entrance="response",
+    equation="friction h_f^2 + h_c^2 exp(-x^2/2), x = (phi - heading)/width",
+    source="a dent or dirt in the race of the vane's bearing",
+    region="about one heading of the vane, in weak wind",
+    parameters=(
+        Parameter("catch_speed", "m/s", 0.0, 8.0, minimum=0.5, step=0.1),
+        Parameter("heading", "deg", -180.0, 180.0, healthy=None, step=1.0, wraps=360.0),
+        Parameter("width", "deg", 1.0, 20.0, healthy=None, step=0.5),
+    ),
+    applies=_turns_about_the_vertical,
+    update=_catch,
+    smooths=True,
+    templates=tuple(
+        {"catch_speed": 1.5, "heading": heading, "width": 5.0}
+        for heading in np.arange(-180.0, 180.0, 15.0).tolist()
+    ),
+    confusable={
+        "vane_friction": "turn the vane by hand: it catches at one heading only",
+        "potentiometer_gap": "turn the vane by hand in still air",
+        "vane_eccentricity": "turn the vane by hand in still air",
+    },
+)
+
+SUSPECTS = (PLAY, SLEW_LIMIT, CATCH)
+"""All of them, in the order in which they are tried."""
