@@ -111,8 +111,6 @@ CATCH = Effect(
     ),
     confusable={
         "vane_friction": "turn the vane by hand: it catches at one heading only",
-        "potentiometer_gap": "turn the vane by hand in still air",
-        "vane_eccentricity": "turn the vane by hand in still air",
     },
 )
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
 from dataclasses import dataclass
 
-from wind_sensors.diagnosis.effects.definition import entry_of, touched
+import numpy as np
+
+from wind_sensors.diagnosis.effects.definition import Effect, entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import Fit, Term, fit, planted
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -17,6 +19,10 @@ from wind_sensors.station.model import Station
 OUTDONE = 10.0
 """A name is withdrawn if a suspected fault in its place lowers the cost by more than this, each
 parameter paid for."""
+
+
+STARTS = 3
+"""From so many of its templates a fault is fitted."""
 
 
 @dataclass(frozen=True)
@@ -60,27 +66,47 @@ def suspicion_of(naming: Naming, station: Station, workers: int = 1) -> Suspicio
     whitener = naming.whitener
     known = _price(whitener, naming.fit)
 
-    def tried(exchange: tuple[Term, Term]) -> Suspicion:
+    def tried(exchange: tuple[Term, Effect]) -> Suspicion:
         term, fault = exchange
         others = [t for t in naming.fit.terms if t is not term]
-        explained = fit(whitener, station, [*others, fault])
-        gain = known - _price(whitener, explained)
-        return Suspicion(explained.terms[-1], term.effect.name, gain)
+        found = min(
+            (
+                fit(whitener, station, [*others, start])
+                for start in _starts(whitener, station, others, term, fault)
+            ),
+            key=lambda f: f.cost,
+        )
+        return Suspicion(found.terms[-1], term.effect.name, known - _price(whitener, found))
 
-    exchanges = [(t, fault) for t in naming.fit.terms for fault in _in_place_of(t, station)]
+    exchanges = [(t, fault) for t in naming.fit.terms for fault in _mistaken_for(t, station)]
     best = max(in_parallel(tried, exchanges, workers), key=lambda s: s.gain, default=None)
     return best if best is not None and best.gain > OUTDONE else None
 
 
-def _in_place_of(term: Term, station: Station) -> Iterable[Term]:
-    """Suspected faults, in their starting sizes, that can be mistaken for a term."""
-    for fault in SUSPECTS:
-        if term.effect.name in fault.confusable and any(
+def _mistaken_for(term: Term, station: Station) -> list[Effect]:
+    """Suspected faults that can be mistaken for a term."""
+    return [
+        fault
+        for fault in SUSPECTS
+        if term.effect.name in fault.confusable
+        and any(
             fault.applies(entry_of(station, entry), station)
             for entry in touched(station, fault, term.instrument)
-        ):
-            for values in fault.templates:
-                yield Term(fault, term.instrument, dict(values), term.interval)
+        )
+    ]
+
+
+def _starts(
+    whitener: Whitener, station: Station, others: list[Term], term: Term, fault: Effect
+) -> list[Term]:
+    """Those sizes and places of a fault, in a term's place, that explain most as they are."""
+    terms = [Term(fault, term.instrument, dict(v), term.interval) for v in fault.templates]
+
+    def cost(start: Term) -> float:
+        simulated = whitener.comparison.possible(planted(station, [*others, start]))
+        return math.inf if simulated is None else float(np.sum(whitener.of(simulated) ** 2))
+
+    return sorted(terms, key=cost)[:STARTS]
 
 
 def _price(whitener: Whitener, explanation: Fit) -> float:
