@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import next_fast_len
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
@@ -65,7 +64,7 @@ def prepare(
             recording.name,
             f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
         )
-    grid = _grid(drive.start_ns, seconds)
+    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
     channels = tuple(
         c
         for c in channels_of(known)
@@ -122,17 +121,6 @@ def prepare(
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
-
-
-def _grid(start: int, seconds: float) -> Grid:
-    """Bins of the compared series, as many as a cosine transform is quick with.
-
-    With a large prime factor it takes six times as long; the bins are up to some hundredths shorter
-    than `SERIES_INTERVAL` instead.
-    """
-    fewest = int(seconds / SERIES_INTERVAL)
-    n = next_fast_len(fewest, real=False)
-    return Grid(start, fewest * SERIES_INTERVAL / n, n)
 
 
 def _where_rotors_turn(
