@@ -106,8 +106,8 @@ CATCH = Effect(
     update=_catch,
     smooths=True,
     templates=tuple(
-        {"catch_speed": 1.5, "heading": heading, "width": 5.0}
-        for heading in np.arange(-180.0, 180.0, 15.0).tolist()
+        {"catch_speed": 1.5, "heading": heading, "width": 8.0}
+        for heading in np.arange(-180.0, 180.0, 20.0).tolist()
     ),
     confusable={
         "vane_friction": "turn the vane by hand: it catches at one heading only",

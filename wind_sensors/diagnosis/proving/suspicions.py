@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from wind_sensors.diagnosis.effects.definition import Effect, entry_of, touched
+from wind_sensors.diagnosis.effects.definition import entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import Fit, Term, fit, planted
@@ -21,8 +22,15 @@ OUTDONE = 10.0
 parameter paid for."""
 
 
-STARTS = 3
-"""From so many of its templates a fault is fitted."""
+STARTS = 2
+"""From so many of its templates, those that explain most as they are, a fault is fitted."""
+
+
+class Exchange(NamedTuple):
+    """A suspected fault in the place of an effect."""
+
+    term: Term
+    fault: Term
 
 
 @dataclass(frozen=True)
@@ -64,49 +72,41 @@ def suspicion_of(naming: Naming, station: Station, workers: int = 1) -> Suspicio
         None: no suspected fault explains more than the effects with which it can be confused.
     """
     whitener = naming.whitener
-    known = _price(whitener, naming.fit)
 
-    def tried(exchange: tuple[Term, Effect]) -> Suspicion:
-        term, fault = exchange
-        others = [t for t in naming.fit.terms if t is not term]
-        found = min(
-            (
-                fit(whitener, station, [*others, start])
-                for start in _starts(whitener, station, others, term, fault)
-            ),
-            key=lambda f: f.cost,
-        )
-        return Suspicion(found.terms[-1], term.effect.name, known - _price(whitener, found))
+    def with_fault(start: Exchange) -> list[Term]:
+        return [*(t for t in naming.fit.terms if t is not start.term), start.fault]
 
-    exchanges = [(t, fault) for t in naming.fit.terms for fault in _mistaken_for(t, station)]
-    best = max(in_parallel(tried, exchanges, workers), key=lambda s: s.gain, default=None)
+    def as_it_is(start: Exchange) -> float:
+        simulated = whitener.comparison.possible(planted(station, with_fault(start)))
+        return math.inf if simulated is None else float(np.sum(whitener.of(simulated) ** 2))
+
+    def fitted(start: Exchange) -> Suspicion:
+        found = fit(whitener, station, with_fault(start))
+        gain = _price(whitener, naming.fit) - _price(whitener, found)
+        return Suspicion(found.terms[-1], start.term.effect.name, gain)
+
+    starts = [start for term in naming.fit.terms for start in _starts(term, station)]
+    costs = in_parallel(as_it_is, starts, workers)
+    cheapest: dict[tuple[tuple[str, str], str], list[Exchange]] = {}
+    for _, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
+        cheapest.setdefault((start.term.key, start.fault.effect.name), []).append(start)
+    chosen = [start for group in cheapest.values() for start in group[:STARTS]]
+    best = max(in_parallel(fitted, chosen, workers), key=lambda s: s.gain, default=None)
     return best if best is not None and best.gain > OUTDONE else None
 
 
-def _mistaken_for(term: Term, station: Station) -> list[Effect]:
-    """Suspected faults that can be mistaken for a term."""
+def _starts(term: Term, station: Station) -> list[Exchange]:
+    """Suspected faults that can be mistaken for a term, in all their templates."""
     return [
-        fault
+        Exchange(term, Term(fault, term.instrument, dict(values), term.interval))
         for fault in SUSPECTS
         if term.effect.name in fault.confusable
         and any(
             fault.applies(entry_of(station, entry), station)
             for entry in touched(station, fault, term.instrument)
         )
+        for values in fault.templates
     ]
-
-
-def _starts(
-    whitener: Whitener, station: Station, others: list[Term], term: Term, fault: Effect
-) -> list[Term]:
-    """Those sizes and places of a fault, in a term's place, that explain most as they are."""
-    terms = [Term(fault, term.instrument, dict(v), term.interval) for v in fault.templates]
-
-    def cost(start: Term) -> float:
-        simulated = whitener.comparison.possible(planted(station, [*others, start]))
-        return math.inf if simulated is None else float(np.sum(whitener.of(simulated) ** 2))
-
-    return sorted(terms, key=cost)[:STARTS]
 
 
 def _price(whitener: Whitener, explanation: Fit) -> float:
