@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import next_fast_len
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
@@ -66,7 +64,7 @@ def prepare(
             recording.name,
             f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
         )
-    grid = Grid(drive.start_ns, SERIES_INTERVAL, _bins(seconds))
+    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
     channels = tuple(
         c
         for c in channels_of(known)
@@ -123,18 +121,6 @@ def prepare(
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
     return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
-
-
-def _bins(seconds: float) -> int:
-    """Number of bins in a record: those that are full, and the last one with them where a cosine
-    transform is quick with that number.
-
-    A quarter of an hour less a sample has 4499 bins and a part, and a transform of 4499 numbers
-    (11 times 409) takes six times as long as one of 4500.
-    """
-    full = int(seconds / SERIES_INTERVAL)
-    begun = math.ceil(seconds / SERIES_INTERVAL)
-    return begun if next_fast_len(begun, real=False) == begun else full
 
 
 def _where_rotors_turn(
