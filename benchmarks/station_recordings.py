@@ -1,6 +1,6 @@
 """Verdicts on the shared recordings of three stations: healthy, open and sealed.
 
-    python benchmarks/station_recordings.py [healthy] [open] [sealed]
+    OPENBLAS_NUM_THREADS=1 python benchmarks/station_recordings.py [healthy] [open] [sealed]
 
 A healthy recording is judged by the others of its station, the rest by all healthy ones.
 """
