@@ -297,9 +297,8 @@ def diagnose(
     if calm and verdict == "unknown":
         verdict = "inconclusive"
     if verdict == "unknown" and not objection:
-        suspicion = suspicion_of(naming, baseline.station, workers)
-        if suspicion is not None:
-            objection = f"{suspicion.words} than {suspicion.effect}"
+        suspicion = suspicion_of(naming, baseline.station, workers, beside=True)
+        objection = suspicion.words if suspicion is not None else ""
     named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)

@@ -26,10 +26,14 @@ STARTS = 2
 """From so many of its templates, those that explain most as they are, a fault is fitted."""
 
 
-class Exchange(NamedTuple):
-    """A suspected fault in the place of an effect."""
+BESIDE = 50.0
+"""An unknown is described by a fault that lowers the cost by more than this beside what fits."""
 
-    term: Term
+
+class Trial(NamedTuple):
+    """A suspected fault in the place of an effect, or beside all of them (None)."""
+
+    term: Term | None
     fault: Term
 
 
@@ -39,12 +43,12 @@ class Suspicion:
 
     Attributes:
         fault: What it would be, with its size.
-        effect: Name of the effect in whose place it was tried.
-        gain: Drop of the cost by the exchange, parameters paid for.
+        effect: Name of the effect in whose place it was tried; None: beside all of them.
+        gain: Drop of the cost by it, parameters paid for.
     """
 
     fault: Term
-    effect: str
+    effect: str | None
     gain: float
 
     @property
@@ -53,58 +57,78 @@ class Suspicion:
         sizes = ", ".join(
             f"{self.fault.values[p.name]:.2g} {p.unit}" for p in self.fault.effect.parameters
         )
+        against = f" than {self.effect}" if self.effect is not None else ""
         return (
             f"{self.fault.effect.meaning} ({self.fault.instrument}, {sizes}), which the catalogue "
-            f"does not hold, would explain more by {self.gain:.0f} in minus twice the "
+            f"does not hold, would explain more{against}, by {self.gain:.0f} in minus twice the "
             "log-likelihood"
         )
 
 
-def suspicion_of(naming: Naming, station: Station, workers: int = 1) -> Suspicion | None:
+def suspicion_of(
+    naming: Naming, station: Station, workers: int = 1, beside: bool = False
+) -> Suspicion | None:
     """The suspected fault that explains most beyond what the effect in its place does.
 
     Args:
         naming: The explanation.
         station: As commissioned.
         workers: Processes.
+        beside: Faults are tried beside what fits, too, which is known not to be all.
 
     Returns:
         None: no suspected fault explains more than the effects with which it can be confused.
     """
     whitener = naming.whitener
 
-    def with_fault(start: Exchange) -> list[Term]:
-        return [*(t for t in naming.fit.terms if t is not start.term), start.fault]
+    def with_fault(start: Trial) -> list[Term]:
+        return [*(t for t in naming.fit.terms if t != start.term), start.fault]
 
-    def as_it_is(start: Exchange) -> float:
+    def as_it_is(start: Trial) -> float:
         simulated = whitener.comparison.possible(planted(station, with_fault(start)))
         return math.inf if simulated is None else float(np.sum(whitener.of(simulated) ** 2))
 
-    def fitted(start: Exchange) -> Suspicion:
+    def fitted(start: Trial) -> Suspicion:
         found = fit(whitener, station, with_fault(start))
         gain = _price(whitener, naming.fit) - _price(whitener, found)
-        return Suspicion(found.terms[-1], start.term.effect.name, gain)
+        effect = start.term.effect.name if start.term is not None else None
+        return Suspicion(found.terms[-1], effect, gain)
 
-    starts = [start for term in naming.fit.terms for start in _starts(term, station)]
+    starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
+    if beside:
+        compared = {c.instrument for c in whitener.comparison.channels}
+        starts += [start for name in sorted(compared) for start in _of_instrument(name, station)]
     costs = in_parallel(as_it_is, starts, workers)
-    cheapest: dict[tuple[tuple[str, str], str], list[Exchange]] = {}
+    cheapest: dict[tuple[object, ...], list[Trial]] = {}
     for _, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
-        cheapest.setdefault((start.term.key, start.fault.effect.name), []).append(start)
+        key = (start.term.key if start.term is not None else None, start.fault.key)
+        cheapest.setdefault(key, []).append(start)
     chosen = [start for group in cheapest.values() for start in group[:STARTS]]
-    best = max(in_parallel(fitted, chosen, workers), key=lambda s: s.gain, default=None)
-    return best if best is not None and best.gain > OUTDONE else None
+    found = in_parallel(fitted, chosen, workers)
+    telling = [s for s in found if s.gain > (OUTDONE if s.effect is not None else BESIDE)]
+    return max(telling, key=lambda s: s.gain, default=None)
 
 
-def _starts(term: Term, station: Station) -> list[Exchange]:
+def _in_place_of(term: Term, station: Station) -> list[Trial]:
     """Suspected faults that can be mistaken for a term, in all their templates."""
     return [
-        Exchange(term, Term(fault, term.instrument, dict(values), term.interval))
+        Trial(term, Term(fault, term.instrument, dict(values), term.interval))
         for fault in SUSPECTS
         if term.effect.name in fault.confusable
         and any(
             fault.applies(entry_of(station, entry), station)
             for entry in touched(station, fault, term.instrument)
         )
+        for values in fault.templates
+    ]
+
+
+def _of_instrument(name: str, station: Station) -> list[Trial]:
+    """Suspected faults that an instrument can have, in all their templates."""
+    return [
+        Trial(None, Term(fault, name, dict(values)))
+        for fault in SUSPECTS
+        if fault.applies(station.instrument(name), station)
         for values in fault.templates
     ]
 
