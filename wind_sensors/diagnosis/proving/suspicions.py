@@ -55,11 +55,12 @@ class Suspicion:
     def words(self) -> str:
         """For people."""
         sizes = ", ".join(
-            f"{self.fault.values[p.name]:.2g} {p.unit}" for p in self.fault.effect.parameters
+            f"{p.name.replace('_', ' ')} {self.fault.values[p.name]:.2g} {p.unit}"
+            for p in self.fault.effect.parameters
         )
         against = f" than {self.effect}" if self.effect is not None else ""
         return (
-            f"{self.fault.effect.meaning} ({self.fault.instrument}, {sizes}), which the catalogue "
+            f"{self.fault.effect.meaning} ({self.fault.instrument}: {sizes}), which the catalogue "
             f"does not hold, would explain more{against}, by {self.gain:.0f} in minus twice the "
             "log-likelihood"
         )
