@@ -109,7 +109,7 @@ def vane_of(s: Instruments, i: int) -> VaneParameters:
     """Constants of vane i without friction: a vane that sticks has no slope that a filter could
     follow. It is added smoothly, and what it withstands at rest is left to the filter's noise."""
     v = s.vane[i]
-    return VaneParameters(v[0], v[1], v[2], v[3], 0.0, v[5], v[6], v[7], v[8], v[9])
+    return VaneParameters(v[0], v[1], v[2], v[3], 0.0, v[5], v[6], 0.0, v[8], v[9])
 
 
 @compiled

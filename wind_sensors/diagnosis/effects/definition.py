@@ -169,8 +169,8 @@ def _named(name: str) -> Effect:
     from wind_sensors.diagnosis.effects import catalogue
     from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 
-    suspects = {effect.name: effect for effect in SUSPECTS}
-    return suspects[name] if name in suspects else catalogue()[name]
+    known = {effect.name: effect for effect in SUSPECTS} | catalogue()
+    return known[name]
 
 
 def entry_of(station: Station, instrument: str) -> Instrument | Platform:

@@ -12,13 +12,10 @@ from typing import Any
 import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.diagnosis.effects.vane import is_vane
 from wind_sensors.station.model import Angle, Instrument, Platform, Station, Vane
 
 Entry = Instrument | Platform
-
-
-def _is_vane(entry: Entry, station: Station) -> bool:
-    return isinstance(entry, Angle)
 
 
 def _play(entry: Entry, values: Values) -> dict[str, Any]:
@@ -34,7 +31,7 @@ PLAY = Effect(
     source="hysteresis of a coupling with a free angle",
     region="whenever the vane turns back, in any wind",
     parameters=(Parameter("play", "deg", 0.0, 40.0, minimum=1.0, step=0.3),),
-    applies=_is_vane,
+    applies=is_vane,
     update=_play,
     noisy=True,
     smooths=True,
@@ -62,7 +59,7 @@ SLEW_LIMIT = Effect(
     source="a logger or a driver that refuses jumps",
     region="quick turns; slow ones pass",
     parameters=(Parameter("fastest", "deg/s", 1.0, 400.0, healthy=None, step=1.0),),
-    applies=_is_vane,
+    applies=is_vane,
     update=_slew_limit,
     noisy=True,
     smooths=True,
@@ -74,7 +71,6 @@ SLEW_LIMIT = Effect(
         "vane_friction": "a jump of the vane by hand",
     },
 )
-
 
 
 def _catch(entry: Entry, values: Values) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from wind_sensors.station.model import Angle, Instrument, Platform, Station
 Entry = Instrument | Platform
 
 
-def _is_vane(entry: Entry, station: Station) -> bool:
+def is_vane(entry: Entry, station: Station) -> bool:
+    """Whether an entry has a nose that the wind turns."""
     return isinstance(entry, Angle)
 
 
@@ -34,7 +35,7 @@ VANE_FRICTION = Effect(
             "friction_speed", "m/s", 0.0, 6.0, minimum=0.5, step=0.1, starts=(0.5, 1.0, 1.5, 2.2)
         ),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_friction,
     noisy=True,
     templates=({"friction_speed": 0.5}, {"friction_speed": 1.2}),
@@ -65,7 +66,7 @@ VANE_INERTIA = Effect(
             starts=(2.0, 4.0),
         ),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_inertia,
     form_error=0.1,
     templates=({"inertia_factor": 1.4}, {"inertia_factor": 3.0}),
@@ -96,7 +97,7 @@ VANE_DAMPING = Effect(
             starts=(0.5, 2.0, 4.0),
         ),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_damping,
     form_error=0.15,
     templates=({"damping_factor": 1.4}, {"damping_factor": 0.6}),
@@ -146,7 +147,7 @@ VANE_IMBALANCE = Effect(
         Parameter("tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
         Parameter("tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_imbalance,
     templates=(
         {"imbalance": 0.3, "tilt_x": 3.0, "tilt_y": 0.0},
@@ -177,7 +178,7 @@ VANE_OFFSET = Effect(
             "offset", "deg", -200.0, 200.0, minimum=1.0, step=0.3, starts=(90.0, -90.0, 180.0)
         ),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_offset,
     exact=True,
     templates=({"offset": 1.0},),
@@ -210,7 +211,7 @@ VANE_ECCENTRICITY = Effect(
         Parameter("sine", "deg", -30.0, 30.0, minimum=1.0, step=0.3),
         Parameter("cosine", "deg", -30.0, 30.0, minimum=1.0, step=0.3),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_eccentricity,
     templates=({"sine": 1.0, "cosine": 0.0}, {"sine": 0.0, "cosine": 1.0}),
     confusable={
@@ -247,7 +248,7 @@ POTENTIOMETER_GAP = Effect(
         Parameter("reading", "deg", -540.0, 540.0, healthy=None, step=2.0, wraps=360.0),
         Parameter("form", "1", 0.0, 2.0, healthy=None, value_from="forms"),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_gap,
     noisy=True,
     templates=tuple(
@@ -275,7 +276,7 @@ QUANTISATION = Effect(
         Parameter("step", "deg", 0.0, 95.0, minimum=2.0, step=0.5, value_from="signals"),
         Parameter("origin", "deg", -360.0, 360.0, healthy=None, value_from="signals"),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_quantisation,
     exact=True,
     noisy=True,
@@ -299,7 +300,7 @@ LOW_PASS_FILTER = Effect(
     parameters=(
         Parameter("time_constant", "s", 0.0, 20.0, minimum=0.1, step=0.05, starts=(0.3, 1.0)),
     ),
-    applies=_is_vane,
+    applies=is_vane,
     update=_low_pass,
     form_error=0.1,
     templates=({"time_constant": 0.1}, {"time_constant": 0.5}),
@@ -324,7 +325,7 @@ SENSOR_SWAP = Effect(
     region="all directions",
     standing=0.0,
     parameters=(Parameter("reversed", "1", 0.0, 1.0, minimum=0.6, value_from="forms"),),
-    applies=_is_vane,
+    applies=is_vane,
     update=_reversed,
     exact=True,
     templates=({"reversed": 1.0},),

@@ -21,10 +21,8 @@ OUTDONE = 10.0
 """A name is withdrawn if a suspected fault in its place lowers the cost by more than this, each
 parameter paid for."""
 
-
 STARTS = 2
 """From so many of its templates, those that explain most as they are, a fault is fitted."""
-
 
 BESIDE = 50.0
 """An unknown is described by a fault that lowers the cost by more than this beside what fits."""
@@ -101,7 +99,9 @@ def suspicion_of(
         starts += [start for name in sorted(compared) for start in _of_instrument(name, station)]
     costs = in_parallel(as_it_is, starts, workers)
     cheapest: dict[tuple[object, ...], list[Trial]] = {}
-    for _, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
+    for cost, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
+        if math.isinf(cost):
+            continue
         key = (start.term.key if start.term is not None else None, start.fault.key)
         cheapest.setdefault(key, []).append(start)
     chosen = [start for group in cheapest.values() for start in group[:STARTS]]
