@@ -57,6 +57,19 @@ def test_the_jacobian_agrees_with_richardson_differences() -> None:
             assert np.allclose(found[:, index], (4.0 * fine - coarse) / 3.0, atol=2e-4)
 
 
+def test_a_bearing_that_catches_is_left_out_of_the_filters_smooth_vane() -> None:
+    catching = {"catch_speed": 6.0, "catch_heading_deg": 0.0, "catch_width_deg": 6.0}
+    s, without = instruments_of(mast(vane=catching)), instruments_of(mast())
+    assert not np.array_equal(s.vane, without.vane)
+    c, wind = calm_circumstances(), np.array([-6.0, 0.0, 0.0])
+    for heading in np.radians([-3.0, -1.0, 0.0, 2.0]):
+        after, free = np.empty(4), np.empty(4)
+        state = np.array([6.0, 0.0, heading, 0.3])
+        advance_station(s, wind, wind, c, c, state, 0.05, after)
+        advance_station(without, wind, wind, c, c, state, 0.05, free)
+        assert np.array_equal(after, free)
+
+
 def test_the_smoother_equals_dense_conditioning_on_the_innovations() -> None:
     recording = blown(mast(), duration=6.0)
     settings = EstimatorSettings(smoother_lag=50.0)

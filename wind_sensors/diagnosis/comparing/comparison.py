@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import activity, spectra
-from wind_sensors.diagnosis.comparing.observation import Channel, Grid
+from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated, View
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.comparing.turning import where_vanes_follow
@@ -63,61 +63,30 @@ class Trust:
     activity_deviation: FloatArray
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """One recording, prepared for comparing stations with it.
+@dataclass(frozen=True, kw_only=True)
+class Comparison(View):
+    """One recording, viewed beside simulations of it.
+
+    The station of the view is the one the recording is compared with at first (its own, or as
+    commissioned); `expected` deviations of vanes are those it simulates, so that a vane which
+    swings through the opposite direction does not jump by a turn in one series only.
 
     Attributes:
         recording: The recording.
-        station: The station it is compared with at first (its own, or as commissioned).
         drive: Wind, motion, air.
-        grid: Bins of the series.
-        channels: What is compared.
-        direction: Slow direction the apparent wind comes from, at the bins, continuous [rad].
-        speed: Slow apparent wind speed at the bins [m/s].
-        wind_from: Direction the apparent wind comes from at the bins, continuous [rad].
         measured: Of the recording.
-        mask: Weight of each bin, 1 inside the blocks that count, 0 outside; None: all count.
-        expected: Simulated deviation of each vane from `direction` [rad], by channel name.
-            Deviations are counted on the turn that lies nearest to it, so that a vane which
-            swings through the opposite direction does not jump by a turn in one series only.
-        departure: Slow departure of a vane that stays far from there [rad], by channel name.
         place: Where the reference stands; None: unknown.
         memory: What instruments did in `drive`; None: nothing is kept.
     """
 
     recording: Recording
-    station: Station
     drive: Drive
-    grid: Grid
-    channels: tuple[Channel, ...]
-    direction: FloatArray
-    speed: FloatArray
-    wind_from: FloatArray
     measured: Simulated
-    mask: FloatArray | None = None
-    expected: Mapping[str, FloatArray] = field(default_factory=dict)
-    departure: Mapping[str, FloatArray] = field(default_factory=dict)
     place: Place | None = None
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
     _simulated: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
     )
-
-    @property
-    def view(self) -> View:
-        """How the recording and its simulations are looked at."""
-        return View(
-            station=self.station,
-            grid=self.grid,
-            channels=self.channels,
-            direction=self.direction,
-            speed=self.speed,
-            wind_from=self.wind_from,
-            mask=self.mask,
-            expected=self.expected,
-            departure=self.departure,
-        )
 
     def within(self, mask: FloatArray) -> Comparison:
         """The same comparison in the blocks of a mask only, shape (n,)."""
@@ -158,11 +127,6 @@ class Comparison:
         """Nothing of any channel."""
         counted = self.measured.counted & activity.counted_segments(self.grid, self.mask)
         return Simulated({}, {}, {}, {}, counted)
-
-    @property
-    def coefficients(self) -> int:
-        """Number of cosine coefficients compared in each channel."""
-        return self.view.coefficients
 
     def respond(self, station: Station, only: Collection[str] = ()) -> Response:
         """The station's instruments in this recording's wind."""
@@ -267,12 +231,8 @@ class Comparison:
         angles: Mapping[str, Angles],
         expected_pulses: Mapping[str, Pulses] | None = None,
     ) -> Simulated:
-        """Series and statistics of pulses and readings, as `View.observe` gives them."""
-        return self.unseen.with_others(self.view.observe(pulses, angles, expected_pulses))
-
-    def masked(self, values: FloatArray) -> FloatArray:
-        """Values of the bins with those outside the mask set to zero."""
-        return self.view.masked(values)
+        """As `View.observe`, with the segments that are counted in the recording."""
+        return self.unseen.with_others(super().observe(pulses, angles, expected_pulses))
 
     def coherence(self, simulated: Simulated, channel: Channel) -> spectra.Coherence:
         """Coherence of measured and simulated series, a vane's with its slow turning included."""
