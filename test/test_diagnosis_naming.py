@@ -162,14 +162,19 @@ def test_a_beginning_and_an_end_of_an_effect_that_depends_on_the_direction() -> 
     assert end == pytest.approx(290.0, abs=15.0)
 
 
-def test_a_counter_that_begins_to_lose_what_follows_too_soon() -> None:
+@pytest.mark.parametrize("interval", [(170.0, None), (110.0, 260.0)])
+def test_a_counter_that_loses_what_follows_too_soon_for_a_while(
+    interval: tuple[float, float | None],
+) -> None:
     effect = catalogue()["missed_pulses"]
     dead = {"dead_time": 0.013, "loss_probability": 0.0}
-    station = with_effect(STATION, effect, "cup", dead, (170.0, None))
+    station = with_effect(STATION, effect, "cup", dead, interval)
     found = diagnose(recorded(station, 53), baseline())
     assert [f.term.key for f in found.findings] == [("missed_pulses", "cup")]
     assert found.findings[0].term.values["dead_time"] == pytest.approx(0.013, rel=0.1)
-    assert found.findings[0].term.interval[0] == pytest.approx(170.0, abs=25.0)
+    begin, end = found.findings[0].term.interval
+    assert begin == pytest.approx(interval[0], abs=25.0)
+    assert end == (None if interval[1] is None else pytest.approx(interval[1], abs=25.0))
 
 
 def test_a_rotor_held_still_in_the_wind_suggests_a_bearing_that_sticks() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -70,7 +71,10 @@ DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 other, and nothing shows the way."""
 
 DEAD_TIME_CUTS = 30
-"""Places in the record where a counter may begin or cease to lose what follows too soon."""
+"""Parts of the record, at whose ends a counter may begin or cease to lose what follows too soon."""
+
+SHORTEST_SHARE = 0.001
+"""Share of intervals that are shorter than a dead time all the same: pulses of another cause."""
 
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
@@ -239,19 +243,27 @@ def _dead_times(
         recorded, expected: End [s since the first bin] and length [s] of each interval.
     """
     length = comparison.grid.n * comparison.grid.dt
-    cuts = [length * k / DEAD_TIME_CUTS for k in range(1, DEAD_TIME_CUTS)]
-    spans = [(0.0, length), *((cut, length) for cut in cuts), *((0.0, cut) for cut in cuts)]
+    cuts = np.linspace(0.0, length, DEAD_TIME_CUTS + 1)
+    found = [_sorted_between(cuts, *recorded), _sorted_between(cuts, *expected)]
+    shortest_few = [
+        cell[: int(SHORTEST_SHARE * recorded[1].size) + 1] for cell in found[0]
+    ]  # fmt: skip
     best: tuple[int, float, Interval] | None = None
-    for begin, end in spans:
-        interval = recorded[1][(recorded[0] >= begin) & (recorded[0] < end)]
-        usual = expected[1][(expected[0] >= begin) & (expected[0] < end)]
-        if interval.size < 100 or usual.size < 100:
+    # The whole record comes first, then what begins or ends in it: a part of it must miss more.
+    for begin, end in sorted(
+        itertools.combinations(range(DEAD_TIME_CUTS + 1), 2),
+        key=lambda span: (span[0] > 0) + (span[1] < DEAD_TIME_CUTS),
+    ):
+        intervals = sum(cell.size for cell in found[0][begin:end])
+        usual = sum(cell.size for cell in found[1][begin:end])
+        if intervals < 100 or usual < 100:
             continue
-        shortest = float(np.quantile(interval, 0.001))
-        missing = int(np.count_nonzero(usual < 0.97 * shortest))
-        # The whole record comes first: a part of it must miss more than all of it does.
-        if missing > 0.004 * usual.size and (best is None or missing > best[0]):
-            best = missing, shortest, interval_of(comparison, begin, end)
+        few = np.concatenate(shortest_few[begin:end])
+        rank = int(SHORTEST_SHARE * intervals)
+        shortest = float(np.partition(few, rank)[rank])
+        missing = sum(int(np.searchsorted(cell, 0.97 * shortest)) for cell in found[1][begin:end])
+        if missing > 0.004 * usual and (best is None or missing > best[0]):
+            best = missing, shortest, interval_of(comparison, cuts[begin], cuts[end])
     if best is None:
         return []
     _, shortest, holds = best
@@ -262,6 +274,12 @@ def _dead_times(
         )
         for share in (1.0, 0.9)
     ]
+
+
+def _sorted_between(cuts: FloatArray, at: FloatArray, values: FloatArray) -> list[FloatArray]:
+    """Values between neighbouring cuts, each lot ascending; `at` ascends."""
+    places = np.searchsorted(at, cuts)
+    return [np.sort(values[i:j]) for i, j in itertools.pairwise(places)]
 
 
 def _run(holds: npt.NDArray[np.bool_], place: int) -> tuple[int, int]:
