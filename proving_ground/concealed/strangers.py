@@ -204,6 +204,66 @@ def twisting_blades(scene: Scene, amount: float, activity: Array) -> Parameters:
     return {"amount": round(amount, 3)}
 
 
+def swaying_mast(scene: Scene, amount: float, activity: Array) -> Parameters:
+    """A slender mast that sways, and carries its instruments through the air, as gusts push it."""
+    frequency = float(scene.rng.uniform(0.25, 0.7))
+    aside = float(scene.rng.uniform(-np.pi, np.pi))
+    speed = np.hypot(scene.rotor_flow[:, 0], scene.rotor_flow[:, 1])
+    growing = 1.0 + 0.5 * np.clip(wandering(scene.rng, scene.time, 5.0, 60.0), -1.5, 1.5)
+    sway = 0.04 * amount * speed.mean() * growing * np.sin(2.0 * np.pi * frequency * scene.time)
+    for flow in (scene.rotor_flow, scene.vane_flow):
+        flow[:, 0] -= activity * sway * np.cos(aside)
+        flow[:, 1] -= activity * sway * np.sin(aside)
+    return {"frequency_hz": round(frequency, 3), "towards_deg": round(float(np.degrees(aside)), 1)}
+
+
+def turning_radar(scene: Scene, amount: float, activity: Array) -> Parameters:
+    """An antenna close by, whose bar shields the instruments twice a turn."""
+    period = float(scene.rng.uniform(1.8, 4.0))
+    passing = np.abs(np.cos(np.pi * scene.time / period)) ** 12
+    shielded = (1.0 - 0.07 * amount * passing * activity)[:, None]
+    scene.rotor_flow *= shielded
+    scene.vane_flow *= shielded
+    return {"period_s": round(period, 3)}
+
+
+def soft_tail(scene: Scene, amount: float, activity: Array) -> Parameters:
+    """A fin that bends away from the wind's pressure and then holds the vane less."""
+    speed = np.hypot(scene.vane_flow[:, 0], scene.vane_flow[:, 1])
+    bent = 0.2 * amount * (speed / 6.0) ** 2
+    scene.vane.density[:] *= 1.0 - activity * bent / (1.0 + bent)
+    return {"share_lost_at_6_m_s": round(0.2 * amount / (1.0 + 0.2 * amount), 3)}
+
+
+def sagging_supply(scene: Scene, amount: float, activity: Array) -> Parameters:
+    """A supply that sags while a radio sends: the vane's voltage, and its reading, fall with it."""
+    every = float(scene.rng.uniform(20.0, 70.0))
+    sending = float(scene.rng.uniform(0.15, 0.4)) * every
+    active = active_at(scene, activity)
+
+    def sag(time: Array, angle: Array) -> Array:
+        depth = 0.02 * amount * (time % every < sending) * active(time)
+        return np.asarray((angle % (2.0 * np.pi)) * (1.0 - depth))
+
+    scene.reading_changes.append(sag)
+    return {"every_s": round(every, 2), "sending_s": round(sending, 2)}
+
+
+def holding_reference(scene: Scene, amount: float, activity: Array) -> Parameters:
+    """A reference that repeats its last good wind while drops sit on its heads."""
+    every = float(scene.rng.uniform(8.0, 25.0))
+    held = float(min(0.9 * amount, 0.7 * every))
+    active = active_at(scene, activity)
+
+    def hold(time: Array, wind: Array) -> Array:
+        wet = (time % every < held) & (active(time) > 0.5)
+        last = np.where(wet, 0, np.arange(time.size))
+        return np.asarray(wind[np.maximum.accumulate(last)])
+
+    scene.reference_changes.append(hold)
+    return {"every_s": round(every, 2), "held_s": round(held, 2)}
+
+
 STRANGERS: dict[str, Cause] = {
     "loose_mount": Cause("station", loose_mount),
     "radio_pulses": Cause("rotor", radio_pulses),
@@ -220,4 +280,9 @@ STRANGERS: dict[str, Cause] = {
     "busy_logger": Cause("rotor", busy_logger),
     "crosstalk": Cause("vane", crosstalk),
     "twisting_blades": Cause("rotor", twisting_blades),
+    "swaying_mast": Cause("station", swaying_mast),
+    "turning_radar": Cause("station", turning_radar),
+    "soft_tail": Cause("vane", soft_tail),
+    "sagging_supply": Cause("vane", sagging_supply),
+    "holding_reference": Cause("reference", holding_reference),
 }
