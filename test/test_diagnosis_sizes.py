@@ -241,6 +241,25 @@ def test_effects_that_take_each_other_back_explain_nothing(gain: float, opposed:
     assert undo_each_other(naming, STATION) is opposed
 
 
+@pytest.mark.parametrize(
+    ("clock", "size", "opposed"),
+    [("timestamp_latency", {"latency": -0.4}, True), ("clock_drift", {"drift": -2700.0}, False)],
+)
+def test_a_drifting_clock_makes_good_a_filters_delay_at_one_time_only(
+    clock: str, size: dict[str, float], opposed: bool
+) -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 72)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    # In the mean of the five minutes each shifts the signal by four tenths of a second.
+    terms = [
+        Term(catalogue()["low_pass_filter"], "vane", {"time_constant": 0.4}),
+        Term(catalogue()[clock], "vane", size),
+    ]
+    both = fit(null, STATION, terms, None, iterations=0)
+    naming = Naming(both, null, null, null.of(searcher.bank.without), 0.0)
+    assert undo_each_other(naming, STATION) is opposed
+
+
 def test_bounces_that_are_seen_may_make_up_for_a_slow_rotor() -> None:
     searcher = searcher_of(prepare(recorded(STATION, 72)), baseline(), catalogue(), {})
     null = searcher.whitener(searcher.bank.without)

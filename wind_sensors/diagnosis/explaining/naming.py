@@ -163,7 +163,8 @@ def _with_sharp_intervals(
 def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
     """Starting points, in the best of the intervals, of effects that the screening hardly sees.
 
-    Of those that act on the signals which the last effect there reaches.
+    Of those that act on the signals which the last effect there reaches: effects of which the raw
+    signals give a guess, and those that the last one is mistaken for.
 
     Args:
         searcher: The search.
@@ -173,15 +174,24 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
     reached = set(searcher.comparison.affected(searcher.station, last.instrument))
     newest = [one.fit.terms[-1] for one in passing]
     known = {term.key for term in newest if term.interval == last.interval}
-    found = []
-    for key, guesses in searcher.guesses.items():
-        touches = reached & set(searcher.comparison.affected(searcher.station, key[1]))
-        if key[0] not in BLIND_IN_PARTS or key in known or not touches:
-            continue
-        starts = [replace(g, interval=last.interval) for g in guesses]
-        if may_join(starts[0], others):
-            found.append(starts)
-    return found
+    starts = {
+        key: list(guesses)
+        for key, guesses in searcher.guesses.items()
+        if key[0] in BLIND_IN_PARTS
+    }
+    for template in searcher.bank.templates:
+        effect = template.effect
+        key = (effect.name, template.instrument)
+        confusable = effect.name in last.effect.confusable or last.effect.name in effect.confusable
+        if confusable and not effect.legible and key not in starts:
+            starts[key] = [Term(effect, key[1], dict(values)) for values in effect.templates]
+    return [
+        [replace(start, interval=last.interval) for start in of_one]
+        for key, of_one in starts.items()
+        if key not in known
+        and reached & set(searcher.comparison.affected(searcher.station, key[1]))
+        and may_join(of_one[0], others)
+    ]
 
 
 def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:

@@ -7,6 +7,7 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing import spectra
+from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import Term, planted
@@ -20,6 +21,10 @@ LEAST_TOGETHER = 0.4
 LEAST_CHANGE = 30.0
 """Two effects that change a signal must together change it by this share of the sum of what each
 does, in squares, if that is more than the second."""
+
+QUARTERS = 4
+"""They take each other back if they do so in each of so many parts of the record: a clock that
+drifts makes good a filter's delay at one time only."""
 
 PARTS = 8
 VARIES = 30.0
@@ -51,7 +56,7 @@ signal as thin air does, which would let the vane overshoot as well."""
 
 
 def undo_each_other(naming: Naming, station: Station) -> bool:
-    """Whether two effects take back on some instrument most of what each does there.
+    """Whether two effects take back on some instrument, all the time, most of what each does there.
 
     Unless the statistics of its raw signals show, un-undone, that something is done.
 
@@ -66,20 +71,47 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
     without = comparison.simulate(station).flat(comparison.channels)
 
     first, second = naming.fit.terms
-    squares = []
+    squares: list[FloatArray] = []
+    in_quarters: list[FloatArray] = []
     for terms in ((first,), (second,), naming.fit.terms):
         moved = comparison.possible(planted(station, terms))
         if moved is None:
             return False
         change = np.nan_to_num(moved.flat(comparison.channels) - without) * weights
-        squares.append(change**2)
-    one, other, together = (np.bincount(comparison.part_of_each, s) for s in squares)
-    changed = one + other > LEAST_CHANGE
-    undone = changed & (together < LEAST_TOGETHER * (one + other))
+        squares.append(np.bincount(comparison.part_of_each, change**2).astype(np.float64))
+        in_quarters.append(_squares_in_quarters(comparison, change))
+    changed, undone = _undone(squares, LEAST_CHANGE)
+    acts, undone_there = _undone(in_quarters, LEAST_CHANGE / QUARTERS)
     channels = len(comparison.channels)
+    always = np.all(undone_there | ~acts, axis=1)
     # Pulses that bounce and a slow rotor undo each other in the mean; the bounces are seen.
     seen = (changed & ~undone)[2 * channels : 3 * channels]
-    return bool(np.any(undone[:channels] & ~seen))
+    return bool(np.any(undone[:channels] & always & ~seen))
+
+
+def _undone(
+    squares: list[FloatArray], least: float
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Where two effects change more than the least, and where they take most of it back.
+
+    Args:
+        squares: Of the changes by the first, by the second, by both.
+        least: Sum of the first two that counts.
+    """
+    one, other, together = squares
+    changed = one + other > least
+    return changed, changed & (together < LEAST_TOGETHER * (one + other))
+
+
+def _squares_in_quarters(comparison: Comparison, change: FloatArray) -> FloatArray:
+    """Squares of white changes of each channel's series in parts of the record, (channels, 4)."""
+    n = comparison.coefficients
+    white = np.zeros((len(comparison.channels), comparison.grid.n))
+    white[:, :n] = change[: n * len(comparison.channels)].reshape(-1, n)
+    squares = [spectra.from_cosine(each) ** 2 for each in white]
+    return np.array(
+        [[part.sum() for part in np.array_split(each, QUARTERS)] for each in squares]
+    )
 
 
 def varies(naming: Naming, station: Station) -> bool:
