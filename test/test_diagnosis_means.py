@@ -179,7 +179,7 @@ def test_a_tower_wake_is_found_at_its_bearing() -> None:
     assert wake.proof.excess_removed > 0.8
     text = outcome_page(outcome)
     assert "<h1>Wake shadow (one_b)</h1>" in text
-    assert "<div class='scroll'><svg" in text
+    assert text.count("<div class='wide'><svg") == text.count("<div class='narrow'><svg") > 0
 
 
 def test_other_heights_say_which_of_two_cups_has_changed() -> None:

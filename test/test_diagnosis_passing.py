@@ -116,8 +116,14 @@ def test_where_another_effect_passes_one_that_the_screening_hardly_sees_is_tried
         return blind_starts(guessing, [Judged(replace(nothing, terms=(term,)), null, 0.0)])
 
     # Beside an effect of the vane the vane's, in its minutes; beside itself not again.
-    assert starts(eccentric) == [[replace(gap, interval=(100.0, None))]]
-    assert starts(replace(gap, interval=(100.0, None))) == []
+    assert [replace(gap, interval=(100.0, None))] in starts(eccentric)
+    assert not {rotor.key, eccentric.key} & {tried[0].key for tried in starts(eccentric)}
+    assert gap.key not in {t[0].key for t in starts(replace(gap, interval=(100.0, None)))}
+    # It is challenged by what it is mistaken for on the vane, and by nothing on the cup.
+    challengers = {tried[0].key: tried for tried in starts(eccentric)}
+    assert ("vane_imbalance", "vane") in challengers
+    assert {instrument for _, instrument in challengers} == {"vane"}
+    assert all(t.interval == (100.0, None) for t in challengers["vane_imbalance", "vane"])
 
 
 def named(searcher: Searcher, term: Term, alternatives: tuple[Alternative, ...] = ()) -> Naming:

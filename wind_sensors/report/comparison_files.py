@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from wind_sensors.diagnosis.regions import Found
 from wind_sensors.recordings.serialising import TopicMessages
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.recordings.writing import write_topics
-from wind_sensors.report.diagnosis_figures import as_svg, residual_figure
+from wind_sensors.report.cuts import in_both_cuts
+from wind_sensors.report.diagnosis_figures import channel_words, residual_figure
 from wind_sensors.report.diagnosis_files import series_topics
 from wind_sensors.report.diagnosis_page import document
 from wind_sensors.station.writing import station_to_yaml
@@ -92,7 +94,10 @@ def write(
         for c in summary
     )
     figures = "".join(
-        as_svg(residual_figure(comparison, simulated, None, channel))
+        in_both_cuts(
+            partial(residual_figure, comparison, simulated, None, channel),
+            f"recorded minus simulated of {channel_words(channel.name)}",
+        )
         for channel in comparison.channels
     )
     body = (

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Callable
 
 import numpy as np
@@ -11,37 +9,15 @@ from matplotlib.figure import Figure
 from scipy.signal import welch
 from scipy.stats import norm
 
+from wind_sensors.report.cuts import is_narrow
 from wind_sensors.report.demo_results import DemoResults
-from wind_sensors.report.style import CORRECTED, INK, MUTED, RAW, house
+from wind_sensors.report.style import CORRECTED, INK, MUTED, RAW
 from wind_sensors.station.signals import FloatArray
 
 Drawing = Callable[[DemoResults, Figure], None]
 
-WIDE = 9.6
-NARROW = 4.4
 _EXCERPT_SECONDS = 16.0
 _BAND = float(norm.ppf(0.95))
-
-
-def as_svg(drawing: Drawing, results: DemoResults, width: float, height: float) -> str:
-    """A figure as an inline SVG element.
-
-    Args:
-        drawing: One of this module.
-        results: What to show.
-        width, height: [inch].
-    """
-    with house():
-        figure = Figure(figsize=(width, height), layout="constrained")
-        drawing(results, figure)
-        stream = io.StringIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None}, transparent=True)
-    text = stream.getvalue()
-    # Identifiers must differ between the figures of one page.
-    mark = f"{drawing.__name__}{round(width * 10)}"
-    text = re.sub(r'id="([^"]+)"', rf'id="{mark}-\1"', text)
-    text = re.sub(r'(xlink:href="#|url\(#)', rf"\1{mark}-", text)
-    return text[text.index("<svg") :]
 
 
 def gust(results: DemoResults, figure: Figure) -> None:
@@ -148,4 +124,4 @@ def _direction_from(wind: FloatArray) -> FloatArray:
 
 
 def _is_narrow(figure: Figure) -> bool:
-    return float(figure.get_size_inches()[0]) <= NARROW
+    return is_narrow(float(figure.get_size_inches()[0]))

@@ -5,9 +5,13 @@ from __future__ import annotations
 from html import escape
 from typing import NamedTuple
 
-from wind_sensors.report.demo_figures import NARROW, WIDE, Drawing, as_svg, biases, gust, spectra
+from matplotlib.figure import Figure
+
+from wind_sensors.report.cuts import CUTS_STYLE, in_both_cuts, is_narrow
+from wind_sensors.report.demo_figures import Drawing, biases, gust, spectra
 from wind_sensors.report.demo_results import DemoResults, WindowComparison
 from wind_sensors.report.live_agreement import Agreement, shortfalls
+from wind_sensors.report.style import house
 
 
 class Circumstances(NamedTuple):
@@ -48,9 +52,6 @@ letter-spacing:-.02em;font-variant-numeric:tabular-nums}
 .number>span{color:var(--muted);font-size:.92rem;line-height:1.35;display:block;margin-top:.25rem}
 section{padding:1.4rem 1.4rem 1rem;margin:0 0 1.2rem}
 .raw{color:var(--raw)}.corrected{color:var(--corrected)}.ok{color:var(--ok)}
-figure{margin:.6rem 0 .4rem}svg{display:block;width:100%;height:auto}
-svg text{font-family:system-ui,-apple-system,"Segoe UI",sans-serif!important}
-.narrow{display:none}
 .scroll{overflow-x:auto}table{border-collapse:collapse;width:100%;font-size:.93rem}
 th,td{padding:.4rem .5rem;text-align:right;border-bottom:1px solid var(--line);
 font-variant-numeric:tabular-nums;white-space:nowrap}
@@ -58,7 +59,7 @@ th{color:var(--muted);font-weight:600}th:first-child,td:first-child{text-align:l
 footer{color:var(--muted);font-size:.9rem;margin-top:2rem}
 code{font:.92em ui-monospace,monospace;background:#eef2f5;border-radius:5px;padding:.1em .35em}
 @media(max-width:640px){body{font-size:16px}main{padding:1.5rem .8rem 3rem}
-section{padding:1.1rem .9rem .7rem}.wide{display:none}.narrow{display:block}
+section{padding:1.1rem .9rem .7rem}
 .numbers{grid-template-columns:1fr 1fr}.number b{font-size:1.25rem}.number{padding:.8rem .85rem}}
 """
 
@@ -75,7 +76,7 @@ def demo_page(results: DemoResults, run: Circumstances) -> str:
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width,initial-scale=1'>"
         "<title>A gusty hour, as the sensors saw it and as it was</title>"
-        f"<style>{_STYLE}</style></head><body><main>",
+        f"<style>{_STYLE}{CUTS_STYLE}</style></head><body><main>",
         "<h1>A gusty hour, as the sensors saw it and as it was</h1>",
         f"<p class='lead'>{escape(_lead(run))}</p>",
         _numbers(results, factor),
@@ -160,12 +161,14 @@ def _section(title: str, text: str, content: str) -> str:
 
 
 def _figure(drawing: Drawing, results: DemoResults, wide: float, narrow: float) -> str:
-    label = escape((drawing.__doc__ or "").splitlines()[0], quote=True)
-    return (
-        f"<figure role='img' aria-label='{label}'>"
-        f"<div class='wide'>{as_svg(drawing, results, WIDE, wide)}</div>"
-        f"<div class='narrow'>{as_svg(drawing, results, NARROW, narrow)}</div></figure>"
-    )
+    def draw(width: float) -> Figure:
+        height = narrow if is_narrow(width) else wide
+        with house():
+            figure = Figure(figsize=(width, height), layout="constrained")
+            drawing(results, figure)
+        return figure
+
+    return in_both_cuts(draw, (drawing.__doc__ or "").splitlines()[0])
 
 
 def _window_table(windows: tuple[WindowComparison, ...]) -> str:

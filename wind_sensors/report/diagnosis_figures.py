@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 
 import numpy as np
@@ -18,6 +17,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
 from wind_sensors.diagnosis.regions import eddies
 from wind_sensors.report import style
+from wind_sensors.report.cuts import WIDE, is_narrow, label_for, title_for
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,15 +37,6 @@ its own standard deviations."""
 
 _FURTHEST = 40.0
 """Beyond so many standard deviations a point is drawn at the edge, with its number."""
-
-
-def as_svg(made: Figure) -> str:
-    """A figure for a page, as SVG that is scrolled where the page is too narrow to read it."""
-    text = io.StringIO()
-    with style.house():
-        made.savefig(text, format="svg", metadata={"Date": None})
-    content = text.getvalue()
-    return f"<div class='scroll'>{content[content.index('<svg') :]}</div>"
 
 
 def channel_words(name: str) -> str:
@@ -86,7 +77,11 @@ def _binned(
 
 
 def residual_figure(
-    comparison: Comparison, simulated: Simulated, corrected: Simulated | None, channel: Channel
+    comparison: Comparison,
+    simulated: Simulated,
+    corrected: Simulated | None,
+    channel: Channel,
+    width: float = WIDE,
 ) -> Figure:
     """Residual of a channel over time, direction, speed and frequency, before and after.
 
@@ -95,27 +90,31 @@ def residual_figure(
         simulated: Simulation of the station as it is described.
         corrected: With the named physics; None: nothing is named.
         channel: What is shown.
+        width: Of the figure [inch].
     """
     before, after, unit = _series(comparison, simulated, corrected, channel)
-    width = max(int(_SMOOTHING / comparison.grid.dt), 1)
+    smoothed = max(int(_SMOOTHING / comparison.grid.dt), 1)
     at = comparison.grid.centres
     on_platform = comparison.drive.motion is not None
     heading = np.degrees(comparison.wind_from)
     clockwise = np.mod(-heading if on_platform else 90.0 - heading, 360.0)
     with style.house():
-        made = Figure(figsize=(9.0, 6.6), layout="constrained")
-        grid = made.add_gridspec(2, 3)
+        stacked = is_narrow(width)
+        made = Figure(figsize=(width, 10.4 if stacked else 6.6), layout="constrained")
+        grid = made.add_gridspec(4, 1) if stacked else made.add_gridspec(2, 3)
         over_time = made.add_subplot(grid[0, :])
-        by_direction = made.add_subplot(grid[1, 0])
-        by_speed = made.add_subplot(grid[1, 1])
-        by_frequency = made.add_subplot(grid[1, 2])
-        cut = at[width - 1 :] - 0.5 * (width - 1) * comparison.grid.dt
-        over_time.plot(cut, _smooth(before, width), color=style.RAW, label="before")
+        by_direction, by_speed, by_frequency = (
+            made.add_subplot(grid[1 + k, 0] if stacked else grid[1, k]) for k in range(3)
+        )
+        cut = at[smoothed - 1 :] - 0.5 * (smoothed - 1) * comparison.grid.dt
+        over_time.plot(cut, _smooth(before, smoothed), color=style.RAW, label="before")
         if corrected is not None:
-            over_time.plot(cut, _smooth(after, width), color=style.CORRECTED, label="with it")
+            over_time.plot(cut, _smooth(after, smoothed), color=style.CORRECTED, label="with it")
             over_time.legend(loc="upper right", ncols=2)
         over_time.axhline(0.0, color=style.MUTED, linewidth=0.8)
-        over_time.set_title(f"Recorded minus simulated, {channel_words(channel.name)}")
+        over_time.set_title(
+            title_for(width, f"Recorded minus simulated, {channel_words(channel.name)}")
+        )
         over_time.set_xlabel(f"time in s ({_SMOOTHING:.0f} s means)")
         over_time.set_ylabel(unit)
         speeds = np.quantile(comparison.speed, np.linspace(0.0, 1.0, 9))
@@ -133,6 +132,8 @@ def residual_figure(
             axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
             axes.set_xlabel(label)
         by_direction.set_ylabel(unit)
+        if stacked:
+            by_speed.set_ylabel(unit)
         _spectra(comparison, simulated, corrected, channel, by_frequency)
     return made
 
@@ -143,6 +144,7 @@ def statistics_figure(
     simulated: Simulated,
     corrected: Simulated | None,
     channel: Channel,
+    width: float = WIDE,
 ) -> Figure | None:
     """How far spectra and statistics of the raw signals lie from the simulation's; before, after.
 
@@ -154,6 +156,7 @@ def statistics_figure(
         simulated: Simulation of the station as it is described.
         corrected: With the named physics; None: nothing is named.
         channel: What is shown.
+        width: Of the figure [inch].
 
     Returns:
         None if nothing departs from healthy days.
@@ -173,7 +176,8 @@ def statistics_figure(
     bands = [eddies(channel, NORMALISED_BANDS[k : k + 2]) for k in range(BANDS)]
     labels = [*bands, *STATISTICS[channel.kind]]
     with style.house():
-        made = Figure(figsize=(9.0, 1.1 + 0.27 * shown.size), layout="constrained")
+        row_height = 0.38 if is_narrow(width) else 0.27
+        made = Figure(figsize=(width, 1.4 + row_height * shown.size), layout="constrained")
         axes = made.add_subplot()
         axes.axvspan(-_USUAL, _USUAL, color=style.GRID, zorder=0)
         rows = np.arange(shown.size)
@@ -193,14 +197,16 @@ def statistics_figure(
                         ha=side, va="center", color=colour,
                     )  # fmt: skip
         axes.axvline(0.0, color=style.MUTED, linewidth=0.8)
-        axes.set_yticks(rows, [labels[k] for k in shown])
+        axes.set_yticks(rows, [label_for(width, labels[k]) for k in shown])
         axes.invert_yaxis()
-        axes.set_title(f"Raw signals, {channel_words(channel.name)}")
-        axes.set_xlabel("recorded minus simulated, in standard deviations of healthy days")
+        made.suptitle(
+            f"Raw signals, {channel_words(channel.name)}",
+            x=0.01, ha="left", fontsize=11, fontweight="bold", color=style.INK,
+        )  # fmt: skip
+        scale = "recorded minus simulated,\nin standard deviations of healthy days"
+        axes.set_xlabel(scale if is_narrow(width) else scale.replace("\n", " "))
         if corrected is not None:
-            axes.legend(
-                loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=2
-            )
+            made.legend(loc="outside lower left", ncols=2)
     return made
 
 
@@ -210,6 +216,7 @@ def activity_figure(
     simulated: Simulated,
     corrected: Simulated | None,
     channel: Channel,
+    width: float = WIDE,
 ) -> Figure | None:
     """Power of quick eddies over the simulation's, from half-minute to half-minute.
 
@@ -221,6 +228,7 @@ def activity_figure(
         simulated: Simulation of the station as it is described.
         corrected: With the named physics; None: nothing is named.
         channel: What is shown, in the band of eddies that departs most.
+        width: Of the figure [inch].
 
     Returns:
         None if no band departs from healthy days for minutes.
@@ -246,7 +254,7 @@ def activity_figure(
         return None
     at = (np.arange(counted.size) + 0.5) * activity.SEGMENT
     with style.house():
-        made = Figure(figsize=(9.0, 2.6), layout="constrained")
+        made = Figure(figsize=(width, 2.6), layout="constrained")
         axes = made.add_subplot()
         usual = np.exp(_USUAL * float(deviation[band]))
         axes.axhspan(1.0 / usual, usual, color=style.GRID, zorder=0)
@@ -262,7 +270,8 @@ def activity_figure(
         axes.set_xlabel("time in s (means over half a minute)")
         axes.set_ylabel("recorded / simulated power,\nmean of the record: 1")
         words = eddies(channel, activity.EDGES[band : band + 2])
-        axes.set_title(f"{words[0].upper()}{words[1:]}, {channel_words(channel.name)}")
+        title = f"{words[0].upper()}{words[1:]}, {channel_words(channel.name)}"
+        axes.set_title(title_for(width, title))
         if corrected is not None:
             axes.legend(loc="best", ncols=2)
     return made

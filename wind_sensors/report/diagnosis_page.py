@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 
 import numpy as np
@@ -14,9 +15,9 @@ from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import OF_POWER, Found
 from wind_sensors.diagnosis.verdict import Diagnosis
+from wind_sensors.report.cuts import CUTS_STYLE, in_both_cuts
 from wind_sensors.report.diagnosis_figures import (
     activity_figure,
-    as_svg,
     channel_words,
     residual_figure,
     statistics_figure,
@@ -39,7 +40,7 @@ code,.eq{font-family:ui-monospace,monospace;font-size:.92em;overflow-wrap:anywhe
 table{border-collapse:collapse;width:100%;font-size:.95rem}
 th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
 th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.scroll{overflow-x:auto}svg{width:100%;min-width:27rem;height:auto}
+.scroll{overflow-x:auto}
 @media(max-width:30rem){table{font-size:.8rem}th,td{padding:.3rem .25rem}}
 .bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
 .bar i{display:block;height:100%;background:var(--blue)}
@@ -272,12 +273,17 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
     for channel in comparison.channels:
         if channel.name not in wanted:
             continue
-        figures.append(residual_figure(comparison, simulated, corrected, channel))
         known = diagnosis.baseline.channels[channel.name]
-        for drawn in (activity_figure, statistics_figure):
-            raw = drawn(comparison, known, simulated, corrected, channel)
-            if raw is not None:
-                figures.append(raw)
+        shown = (comparison, simulated, corrected, channel)
+        beside_healthy = (comparison, known, simulated, corrected, channel)
+        figures += [
+            in_both_cuts(partial(draw, *of), f"{what} of {channel_words(channel.name)}")
+            for what, draw, of in (
+                ("recorded minus simulated", residual_figure, shown),
+                ("power of eddies", activity_figure, beside_healthy),
+                ("raw signals", statistics_figure, beside_healthy),
+            )
+        ]
     healthy = ", ".join(diagnosis.baseline.recordings) or "none"
     body = [
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
@@ -287,7 +293,7 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
         "described. Blue: with the named physics. Bars are two standard errors; grey is what "
         "healthy days show.</p>"
-        + "".join(as_svg(made) for made in figures)
+        + "".join(figures)
         + "</section>",
         *(_physics(f) for f in diagnosis.findings),
         *(_proof(f) for f in diagnosis.findings[:1]),
@@ -305,6 +311,6 @@ def document(title: str, body: str) -> str:
     return (
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head>"
+        f"<title>{escape(title)}</title><style>{STYLE}{CUTS_STYLE}</style></head>"
         f"<body><main>{body}</main></body></html>\n"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from html import escape
 
 from matplotlib.figure import Figure
@@ -9,7 +10,7 @@ from matplotlib.figure import Figure
 from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
-from wind_sensors.report.diagnosis_figures import as_svg
+from wind_sensors.report.cuts import in_both_cuts, title_for
 from wind_sensors.report.diagnosis_page import (
     VERDICTS,
     document,
@@ -19,10 +20,10 @@ from wind_sensors.report.diagnosis_page import (
 )
 
 
-def panel_figure(panels: list[Panel]) -> Figure:
-    """Residuals before and after: one panel below the other."""
+def panel_figure(panels: list[Panel], width: float) -> Figure:
+    """Residuals before and after: one panel below the other, in a figure so wide [inch]."""
     with style.house():
-        figure = Figure(figsize=(8.0, 2.3 * len(panels)), layout="constrained")
+        figure = Figure(figsize=(width, 2.3 * len(panels)), layout="constrained")
         axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels, strict=True):
             axis.axhline(0.0, color="0.6", linewidth=0.8)
@@ -33,7 +34,7 @@ def panel_figure(panels: list[Panel]) -> Figure:
             axis.plot(panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after")
             axis.set_xlabel(panel.axis)
             axis.set_ylabel(panel.unit)
-            axis.set_title(panel.title, fontsize=10)
+            axis.set_title(title_for(width, panel.title), fontsize=10)
         axes[0].legend(loc="best", fontsize=8)
     return figure
 
@@ -89,7 +90,8 @@ def outcome_page(outcome: Outcome) -> str:
     headline = "; ".join(names) or VERDICTS[outcome.verdict]
     titles = list(dict.fromkeys(p.title for p in outcome.panels))
     figures = "".join(
-        as_svg(panel_figure([p for p in outcome.panels if p.title == title])) for title in titles
+        in_both_cuts(partial(panel_figure, [p for p in outcome.panels if p.title == title]), title)
+        for title in titles
     )
     calibrated = (
         f"Healthy recordings: {', '.join(outcome.healthy)}."

@@ -164,7 +164,7 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
     """Starting points, in the best of the intervals, of effects that the screening hardly sees.
 
     Of those that act on the signals which the last effect there reaches: effects of which the raw
-    signals give a guess, and those that the last one is mistaken for.
+    signals give a guess, and on the same instrument those that the last one is mistaken for.
 
     Args:
         searcher: The search.
@@ -179,11 +179,11 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         for key, guesses in searcher.guesses.items()
         if key[0] in BLIND_IN_PARTS
     }
-    for template in searcher.bank.templates:
-        effect = template.effect
-        key = (effect.name, template.instrument)
+    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
+    for effect in searcher.effects.values():
+        key = (effect.name, last.instrument)
         confusable = effect.name in last.effect.confusable or last.effect.name in effect.confusable
-        if confusable and not effect.legible and key not in starts:
+        if confusable and key in possible and key not in starts and not effect.legible:
             starts[key] = [Term(effect, key[1], dict(values)) for values in effect.templates]
     return [
         [replace(start, interval=last.interval) for start in of_one]
