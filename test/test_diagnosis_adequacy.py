@@ -13,12 +13,14 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.acceptance import (
+    EDDIES_AGAINST,
     PASSING_FORM_GAIN,
     PASSING_GAIN,
+    gained_by_eddies,
     is_plausible,
     passing_gain,
 )
-from wind_sensors.diagnosis.explaining.explanation import judged
+from wind_sensors.diagnosis.explaining.explanation import judged, no_terms
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.healthy.whitening import form_signatures, trust_of, unstanding
@@ -200,6 +202,20 @@ def test_the_noise_that_an_explanation_leaves_counts() -> None:
     ]
     best = judged(searcher, fits, iterations=0)[0]
     assert best.fit.terms[0].values["friction_speed"] == 2.5
+
+
+def test_a_filter_shows_in_the_power_of_eddies_or_is_none() -> None:
+    low_pass, constant = catalogue()["low_pass_filter"], {"time_constant": 1.0}
+    filtered = with_effect(STATION, low_pass, "vane", constant)
+    gained = []
+    for station in (filtered, STATION):
+        searcher = searcher_of(prepare(recorded(station, 67)), baseline(), catalogue(), {})
+        null = searcher.whitener(searcher.bank.without)
+        after = fit(null, STATION, [Term(low_pass, "vane", constant)], None, iterations=0)
+        before = no_terms(null, searcher)
+        gained.append(gained_by_eddies(searcher.comparison, before, after))
+    assert gained[0] > EDDIES_AGAINST
+    assert gained[1] < -EDDIES_AGAINST
 
 
 def _finding(effect: str, instrument: str, share: float, p: float) -> Finding:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explaining.explanation import Judged, no_terms, total
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
@@ -84,6 +85,10 @@ SMALLEST_TOLD = 0.4
 SMALLEST_BESIDE = 1.8
 """The same beside another effect on the same signals, whose form a small one may make good."""
 
+EDDIES_AGAINST = 10.0
+"""What smooths a signal shows in the power of its eddies: there it may not cost more than this,
+whatever the course of the signal gains. True effects bring more than nothing there."""
+
 STALL_SPEED = 4.5
 """Up to this wind speed [m/s] a sticking bearing may hold a rotor."""
 
@@ -134,9 +139,24 @@ def brought(
         return -np.inf
     if too_small(searcher, candidate.fit, total(before)):
         return -np.inf
+    eddies = gained_by_eddies(comparison, before, candidate.fit)
+    if newest.effect.smooths and eddies < -EDDIES_AGAINST:
+        return -np.inf
     gain = total(before) - total(candidate.fit)
     gain -= single_event(comparison, before, candidate.fit)
     return min(gain, before_evidence - candidate.evidence)
+
+
+def gained_by_eddies(comparison: Comparison, before: Fit, after: Fit) -> float:
+    """Drop of the cost in the power of eddies: that of the record, and that of its half-minutes.
+
+    Args:
+        comparison: The recording.
+        before, after: Two explanations in the same null.
+    """
+    channels = len(comparison.channels)
+    gained = np.bincount(comparison.part_of_each, before.vector**2 - after.vector**2)
+    return float(gained[channels : 2 * channels].sum() + gained[3 * channels :].sum())
 
 
 def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> float:
