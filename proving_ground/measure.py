@@ -144,7 +144,7 @@ def _pulses(scene: Scene, azimuth: Array) -> Array:
     places = (np.arange(first, last + 1)[:, None] + scene.slots[None, :]).ravel()
     places = places[(places > turns[0]) & (places < turns[-1])]
     edges = np.interp(places, turns, time)
-    for change in scene.pulse_changes:
+    for change in (*scene.slot_changes, *scene.pulse_changes):
         edges = change(edges)
     edges = np.sort(_stamp(scene, "rotor", edges))
     return edges[edges >= 0.0]

@@ -33,8 +33,8 @@ class Scene:
     time (n) [s] is the grid. reference (n, 3) [m/s] earth frame. rotor_flow, vane_flow (n, 3)
     [m/s] apparent wind in the sensor's frame. motion is what the platform does, reported what its
     odometry says. angle_changes act on the nose heading on the grid, reading_changes on the
-    sampled and wrapped reading, pulse_changes on the edge times, stamp_changes by channel
-    ("rotor", "vane", "odometry") on the stamps.
+    sampled and wrapped reading, slot_changes on the disc's edge times, pulse_changes on what the
+    electronics make of those, stamp_changes by channel ("rotor", "vane", "odometry") on the stamps.
     """
 
     station: Station
@@ -54,6 +54,7 @@ class Scene:
     slots: Array
     angle_changes: list[AngleChange] = field(default_factory=list)
     reading_changes: list[AngleChange] = field(default_factory=list)
+    slot_changes: list[TimesChange] = field(default_factory=list)
     pulse_changes: list[TimesChange] = field(default_factory=list)
     odometry_changes: list[Callable[[Array, Motion], Motion]] = field(default_factory=list)
     reference_changes: list[Callable[[Array, Array], Array]] = field(default_factory=list)

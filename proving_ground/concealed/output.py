@@ -84,7 +84,7 @@ def encoder_slot_error(scene: Scene, amount: float, activity: Array) -> Paramete
         slot = np.arange(edges.size) % count
         return np.sort(edges + active(edges) * error[slot] * interval)
 
-    scene.pulse_changes.append(displace)
+    scene.slot_changes.append(displace)
     return {"slot_errors": [round(float(e), 4) for e in error]}
 
 

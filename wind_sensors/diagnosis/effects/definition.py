@@ -101,6 +101,8 @@ class Effect:
         form_error: Standard error of a size, relative to it, that the simulation's form leaves.
         noisy: What it does is drawn at random or hangs on the last digit (whether a vane sticks
             or slips), so that its simulation adds noise of its own.
+        sticks: From the values, whether it holds and lets go: when it does so hangs on the last
+            digit, so that it leaves noise of its own as what is `noisy` does.
         stirs: It brings eddies of its own where it acts, of which the reference knows nothing.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
@@ -126,6 +128,7 @@ class Effect:
     exact: bool = False
     form_error: float = 0.025
     noisy: bool = False
+    sticks: Callable[[Values], bool] | None = None
     stirs: bool = False
     standing: float = 0.1
     standing_in_calm: float = 0.0

@@ -106,6 +106,7 @@ BEARING_FRICTION = Effect(
     applies=_is_rotor,
     update=_friction,
     standing_in_calm=0.8,
+    sticks=lambda values: values["breakaway"] > 1.0,
     templates=({"friction_speed": 0.5, "temperature_coefficient": 0.0, "breakaway": 1.0},),
     confusable={
         "calibration_offset": "a speed sweep: friction fades as 1/U, an offset stays",

@@ -9,9 +9,11 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
+from wind_sensors.diagnosis.explaining.bounds import run_away
 from wind_sensors.diagnosis.explaining.explanation import Judged, no_terms, total
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
+from wind_sensors.diagnosis.explaining.ruled_out import reads_in_its_gap
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
@@ -126,7 +128,10 @@ def brought(
     event in the record brings does not count.
     """
     newest = candidate.fit.terms[-1]
-    if not plausible(candidate.fit) or is_a_way_of_the_wind(searcher.comparison, newest):
+    comparison = searcher.comparison
+    if not plausible(candidate.fit) or is_a_way_of_the_wind(comparison, newest):
+        return -np.inf
+    if reads_in_its_gap(comparison, newest):
         return -np.inf
     whitener = candidate.whitener
     before = (
@@ -134,7 +139,6 @@ def brought(
         if current.terms
         else no_terms(whitener, searcher)
     )
-    comparison = searcher.comparison
     if not is_steady(comparison, before, candidate.fit):
         return -np.inf
     if too_small(searcher, candidate.fit, total(before)):
@@ -333,25 +337,4 @@ def is_plausible(term: Term, least: float = SMALLEST_SIZE) -> bool:
         term: The term.
         least: Size that it must have, in units of the smallest worth reporting.
     """
-    if not large_enough(term, least):
-        return False
-    for parameter in term.effect.parameters:
-        margin = 0.02 * (parameter.high - parameter.low)
-        shapes = parameter.healthy is None and not parameter.wraps
-        fitted = shapes and parameter.value_from == "fit"
-        beyond = term.values[parameter.name] > parameter.high - margin
-        if parameter.low == -parameter.high:
-            beyond |= term.values[parameter.name] < parameter.low + margin
-        if fitted and beyond:
-            # A wake as wide as half the horizon is none, nor does a flow past a mast bend more.
-            return False
-        if not parameter.graded or parameter.healthy is None or parameter.minimum <= 0.0:
-            continue
-        reach = 0.85 * (parameter.high - 1.0)
-        if parameter.healthy == 1.0 and term.values[parameter.name] > 1.0 + reach:
-            return False
-        value = term.values[parameter.name]
-        at_bound = value < parameter.low + margin or value > parameter.high - margin
-        if at_bound and abs(value - parameter.healthy) > margin:
-            return False
-    return True
+    return large_enough(term, least) and not run_away(term)

@@ -51,12 +51,15 @@ class Term:
         instrument: Name of the instrument, or `platform`.
         values: Parameters.
         interval: Start and end [s since the start of the recording]; (0, None) is always.
+        held: Names of parameters that keep their values in a fit: the signals tell them, or the
+            recording does not.
     """
 
     effect: Effect
     instrument: str
     values: Mapping[str, float]
     interval: Interval = ALWAYS
+    held: frozenset[str] = frozenset()
 
     def planted(self, station: Station) -> Station:
         """The station with the effect."""
@@ -71,6 +74,16 @@ class Term:
     def key(self) -> tuple[str, str]:
         """Effect and instrument."""
         return self.effect.name, self.instrument
+
+    @property
+    def leaves_noise(self) -> bool:
+        """Whether what it does is drawn at random or hangs on the last digit."""
+        sticks = self.effect.sticks
+        return self.effect.noisy or (sticks is not None and sticks(self.values))
+
+    def fits(self, parameter: Parameter) -> bool:
+        """Whether a fit may move one of its parameters."""
+        return parameter.value_from == "fit" and parameter.name not in self.held
 
     @property
     def is_told(self) -> bool:
@@ -414,7 +427,7 @@ def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, Floa
         tied = parameter.free is not None and not parameter.free(drive)
         if (tied or parameter.swing > swings[owner]) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
-        elif parameter.value_from != "fit":
+        elif not terms[owner].fits(parameter):
             low[k] = high[k] = values_of(terms)[k]
     return low, high
 

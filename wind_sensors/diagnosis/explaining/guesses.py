@@ -12,10 +12,11 @@ from scipy.ndimage import uniform_filter1d
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import unevenness_in_parts
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import dead_log
-from wind_sensors.diagnosis.explaining.fitting import Interval, Term
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.explaining.intervals import interval_of
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import BoolArray, erratic
@@ -44,8 +45,8 @@ STIFFENINGS = (-0.03, -0.08, -0.16)
 """Squared friction speeds at the mean temperature [m^2/s^2] and coefficients [1/K] to begin with:
 the two make up for each other, so that a search for one at a time gets lost."""
 
-HOLDING_FRICTIONS = (1.2, 1.6, 2.0)
-BREAKAWAYS = (1.5, 2.2, 3.2)
+HOLDING_FRICTIONS = (1.2, 1.6, 2.0, 2.4)
+BREAKAWAYS = (1.5, 2.2, 3.2, 4.6)
 """Friction speeds [m/s], and friction at rest relative to that of the turning rotor, to begin with
 where a rotor stands still in the wind: its stops and starts make the cost too rough to search."""
 
@@ -70,11 +71,20 @@ DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
 other, and nothing shows the way."""
 
-DEAD_TIME_CUTS = 30
-"""Parts of the record, at whose ends a counter may begin or cease to lose what follows too soon."""
+PARTS_OF_PULSES = 30
+"""Parts of the record, at whose ends a counter may begin or cease to lose what follows too soon,
+or slots to be uneven."""
+
+PASSING_UNEVENNESS = 1.15
+"""Slots are uneven for a part of the record if that explains so many times as much."""
 
 SHORTEST_SHARE = 0.001
 """Share of intervals that are shorter than a dead time all the same: pulses of another cause."""
+
+EDGE = 0.03
+SHARP = 6.0
+"""A counter's dead time shows if so many times as many intervals lie just above the shortest,
+within this share of it, as below: a fit of the whole signal would trade it for another gain."""
 
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
@@ -199,11 +209,12 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     long = float(np.mean(relative > 1.6))
     short = float(np.mean(relative < 0.4))
     usual_long = float(np.mean(usual[1:] > 1.6 * usual[:-1]))
-    if long > 0.004 + 2.0 * usual_long:
+    dead = _dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual))
+    if long > 0.004 + 2.0 * usual_long and not any(term.held for term in dead):
         out.append(
             _term("missed_pulses", rotor.name, dead_time=0.0, loss_probability=min(long, 0.6))
         )
-    out.extend(_dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual)))
+    out.extend(dead)
     if short > 0.004:
         delay = float(np.median(interval[relative < 0.4]))
         out.append(
@@ -219,14 +230,37 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     slots = rotor.pulses_per_revolution
     if slots > 2 and max(scatter, once) > 0.01:
         # An interval is the difference of two slots' displacements.
-        out.append(
-            _term(
-                "encoder_slot_error", rotor.name,
-                scatter=float(scatter) / np.sqrt(2.0),
-                once_per_turn=float(once) / (2.0 * np.sin(np.pi / slots)),
-            )
+        holds, larger = _uneven_span(comparison, time, slots)
+        uneven = _term(
+            "encoder_slot_error", rotor.name,
+            scatter=larger * float(scatter) / np.sqrt(2.0),
+            once_per_turn=larger * float(once) / (2.0 * np.sin(np.pi / slots)),
         )  # fmt: skip
+        out.append(replace(uneven, interval=holds))
     return out
+
+
+def _uneven_span(
+    comparison: Comparison, time: FloatArray, slots: int
+) -> tuple[Interval, float]:
+    """When slots are uneven, and how much more so then than in the mean of the whole record."""
+    length = comparison.grid.n * comparison.grid.dt
+    cuts = np.linspace(0.0, length, PARTS_OF_PULSES + 1)
+    shown = unevenness_in_parts(time, slots, cuts)
+    told = np.isfinite(shown)
+    if not told.any():
+        return ALWAYS, 1.0
+    number = np.concatenate(([0.0], np.cumsum(told)))
+    total = np.concatenate(([0.0], np.cumsum(np.where(told, shown, 0.0))))
+    begin, end = np.triu_indices(cuts.size, 1)
+    within, parts = total[end] - total[begin], np.maximum(number[end] - number[begin], 1.0)
+    # Drop of the sum of squares by one level within a span and nought outside it.
+    drop = within**2 / parts
+    best = int(np.argmax(drop))
+    if drop[best] < PASSING_UNEVENNESS * total[-1] ** 2 / number[-1]:
+        return ALWAYS, 1.0
+    holds = interval_of(comparison, float(cuts[begin[best]]), float(cuts[end[best]]))
+    return holds, float(within[best] / parts[best] / (total[-1] / number[-1]))
 
 
 def _dead_times(
@@ -243,7 +277,7 @@ def _dead_times(
         recorded, expected: End [s since the first bin] and length [s] of each interval.
     """
     length = comparison.grid.n * comparison.grid.dt
-    cuts = np.linspace(0.0, length, DEAD_TIME_CUTS + 1)
+    cuts = np.linspace(0.0, length, PARTS_OF_PULSES + 1)
     found = [_sorted_between(cuts, *recorded), _sorted_between(cuts, *expected)]
     shortest_few = [
         cell[: int(SHORTEST_SHARE * recorded[1].size) + 1] for cell in found[0]
@@ -251,8 +285,8 @@ def _dead_times(
     best: tuple[int, float, Interval] | None = None
     # The whole record comes first, then what begins or ends in it: a part of it must miss more.
     for begin, end in sorted(
-        itertools.combinations(range(DEAD_TIME_CUTS + 1), 2),
-        key=lambda span: (span[0] > 0) + (span[1] < DEAD_TIME_CUTS),
+        itertools.combinations(range(PARTS_OF_PULSES + 1), 2),
+        key=lambda span: (span[0] > 0) + (span[1] < PARTS_OF_PULSES),
     ):
         intervals = sum(cell.size for cell in found[0][begin:end])
         usual = sum(cell.size for cell in found[1][begin:end])
@@ -267,13 +301,25 @@ def _dead_times(
     if best is None:
         return []
     _, shortest, holds = best
+    told = _is_sharp(np.concatenate(found[0]), shortest)
     return [
         replace(
             _term("missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0),
             interval=holds,
+            held=frozenset({"dead_time"}) if told else frozenset(),
         )
-        for share in (1.0, 0.9)
+        for share in ((1.0,) if told else (1.0, 0.9))
     ]
+
+
+def _is_sharp(intervals: FloatArray, shortest: float) -> bool:
+    """Whether many intervals are a little longer than the shortest, and hardly any a little less.
+
+    The end of a distribution that the wind makes thins out; a counter cuts it off.
+    """
+    near = np.abs(intervals / shortest - 1.0) < EDGE
+    above = np.count_nonzero(near & (intervals > shortest))
+    return bool(above > SHARP * np.count_nonzero(near & (intervals <= shortest)))
 
 
 def _sorted_between(cuts: FloatArray, at: FloatArray, values: FloatArray) -> list[FloatArray]:
@@ -431,7 +477,7 @@ def _mostly(
     comparison: Comparison, channel: Channel, where: BoolArray, inside: float
 ) -> list[tuple[float, float]]:
     """Centre and width of the sector in which some readings outnumber others [deg]."""
-    away = np.degrees(_headings(comparison, channel)) - inside
+    away = np.degrees(headings(comparison, channel)) - inside
     away = np.mod(away + 180.0, 360.0) - 180.0
     bins = np.arange(-180.0, 181.0)
     some, _ = np.histogram(away[where], bins)
@@ -447,7 +493,7 @@ def _mostly(
     return [(inside + 0.5 * (low + high) - 180.0, float(high - low))]
 
 
-def _headings(comparison: Comparison, channel: Channel) -> FloatArray:
+def headings(comparison: Comparison, channel: Channel) -> FloatArray:
     """Where the nose should be at each reading [rad]."""
     time = comparison.recording.angles[channel.instrument].time
     heading = comparison.direction + comparison.expected.get(channel.name, 0.0)
@@ -456,7 +502,7 @@ def _headings(comparison: Comparison, channel: Channel) -> FloatArray:
 
 def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple[float, float]:
     """Centre and width of the sector in which the nose should be at some readings [deg]."""
-    at = _headings(comparison, channel)[where]
+    at = headings(comparison, channel)[where]
     centre = float(np.angle(np.mean(np.exp(1j * at))))
     away = np.angle(np.exp(1j * (at - centre)))
     low, middle, high = np.degrees(np.quantile(away, (0.1, 0.5, 0.9)))

@@ -26,6 +26,10 @@ STEADY_P = 0.05
 parts of so many seconds differs from nought by Student's test at this level. A gust that the
 reference missed brings as much, at once."""
 
+OF_COURSE = 0.1
+"""What brings less than this share of its gain by the course of the signals shows in the statistics
+of the whole record: when it gains, parts do not tell."""
+
 LONGEST_MOMENT = 0.25
 OF_A_MOMENT = 0.7
 """An effect of which more than the second share shows in a part of the record that is no longer
@@ -51,6 +55,8 @@ def is_steady(comparison: Comparison, before: Fit, after: Fit) -> bool:
         return True
     width = round(STEADY_TIME / comparison.grid.dt)
     gains = gain_in_parts(comparison, before, after, width)
+    if float(gains.sum()) < OF_COURSE * (before.cost - after.cost):
+        return True
     middle = (np.arange(gains.size) + 0.5) * width * comparison.grid.dt
     at = middle + comparison.drive.elapsed
     begin, end = newest.interval

@@ -75,7 +75,7 @@ def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
     for k, term in enumerate(terms):
         for parameter in term.effect.parameters:
             healthy, value = parameter.healthy, term.values[parameter.name]
-            if healthy is None or value == healthy or parameter.value_from != "fit":
+            if healthy is None or value == healthy or not term.fits(parameter):
                 continue
             for factor in LOOKS:
                 moved = healthy + factor * (value - healthy)

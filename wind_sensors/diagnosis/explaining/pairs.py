@@ -193,4 +193,4 @@ def _scaled(term: Term, share: float) -> Term:
     if term.is_told or term.effect.legible:
         return term
     values = term.effect.scaled(term.values, float(np.clip(share, SMALLEST_SHARE, LARGEST_SHARE)))
-    return replace(term, values=values)
+    return replace(term, values={**values, **{name: term.values[name] for name in term.held}})

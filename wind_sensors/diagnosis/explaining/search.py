@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.explaining.bounds import without_run_aways
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.explaining.screening import (
@@ -198,7 +199,7 @@ class Searcher:
         for key, guesses in self.guesses.items():
             if key in chosen:
                 starts = next(s for s in out if s[0].key == key)
-                if self.effects[key[0]].legible:
+                if self.effects[key[0]].legible or guesses[0].held:
                     starts.clear()
                 starts.extend(guesses)
             elif blind or key[0] not in BLIND_EFFECTS:
@@ -246,6 +247,10 @@ class Searcher:
         best = ranked[0][0]
         close = CLOSE_START * float(whitener.of(self.bank.without).size)
         tried = [k for deviance, k in ranked[:TRIED_STARTS] if smooths or deviance <= best + close]
+        for _, k in ranked:
+            # What holds for a part of the record must grow before it does better than always.
+            if all(starts[k].interval != starts[other].interval for other in tried):
+                tried.append(k)
         if current is not None and self.is_apart(current, starts[0]):
             fits = [self.fit_beside(whitener, current, starts[k]) for k in tried]
         else:
@@ -261,9 +266,14 @@ class Searcher:
             ahead = min(fits, key=lambda f: self.whitener(f.simulated).deviance(f.simulated))
         elif len(fits) > 1:
             ahead = min(fits, key=lambda f: f.cost)
-        return fit(
+        found = fit(
             whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
         )
+        tied = without_run_aways(found.terms[-1])
+        if tied is None:
+            return found
+        terms = [*found.terms[:-1], tied]
+        return fit(whitener, self.station, terms, rest, LAST_ITERATIONS, least=ROUGHLY)
 
     def is_apart(self, current: Fit, start: Term) -> bool:
         """Whether a term acts on signals that those of a fit do not reach."""

@@ -152,7 +152,7 @@ def with_own_noise(naming: Naming) -> set[str]:
     return {
         instrument
         for term in naming.fit.terms
-        if term.effect.noisy
+        if term.leaves_noise
         for instrument in comparison.affected(comparison.station, term.instrument)
     }
 

@@ -12,7 +12,7 @@ from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Term, fit, planted
-from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.healthy.whitening import Whitener, unstanding
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -103,8 +103,7 @@ def side_of(whitener: Whitener, station: Station, mask: FloatArray) -> Side:
             statistics_deviation=t.statistics_deviation / np.sqrt(max(share, 0.1)),
         )
     comparison = whitener.comparison.within(mask)
-    null = Whitener(comparison, trust, np.zeros((0, 0)), np.zeros(0), np.zeros(1))
-    return Side(null, comparison.simulate(station))
+    return Side(unstanding(comparison, trust), comparison.simulate(station))
 
 
 def curves(side: Side, degree: int, over: Sequence[FloatArray]) -> FloatArray:
@@ -156,12 +155,14 @@ class Fold:
         floor: Cost that is left on the fitted blocks when smooth curves over speed and time make
             good what the effects leave, so that a poor fit is not its own measure.
         vector: White residual of the scored blocks, with the effects.
+        fitted: White residual of the fitted blocks, with the effects.
     """
 
     before: FloatArray
     after: FloatArray
     floor: float
     vector: FloatArray
+    fitted: FloatArray
 
 
 def fold_of(fitting: Side, scoring: Side, station: Station, terms: Sequence[Term]) -> Fold:
@@ -169,7 +170,21 @@ def fold_of(fitting: Side, scoring: Side, station: Station, terms: Sequence[Term
     null = fitting.whitener
     fitted = fit(null, station, terms, fitting.healthy, iterations=4, least=ROUGHLY)
     corrected = scoring.whitener.comparison.simulate(planted(station, fitted.terms))
-    return scored(scoring, scoring.whitener.of(corrected), least_left(fitting, fitted.vector))
+    left = fitted.vector
+    return scored(scoring, scoring.whitener.of(corrected), left, least_left(fitting, left))
+
+
+def of_part(fold: Fold, fitting: Side, scoring: Side, part: FloatArray) -> Fold:
+    """The same fit, scored on a part of what is compared.
+
+    Args:
+        fold: The fit.
+        fitting, scoring: Its sides.
+        part: Ones and noughts, shape (m,).
+    """
+    left = part * fold.fitted
+    floor = least_left(fitting, left)
+    return scored(scoring, part * fold.vector, left, floor, part * scoring.before)
 
 
 def least_left(fitting: Side, left: FloatArray) -> float:
@@ -180,12 +195,26 @@ def least_left(fitting: Side, left: FloatArray) -> float:
     return min(float(left @ left), float(rest @ rest) + CHANCE * float(rank))
 
 
-def scored(scoring: Side, vector: FloatArray, floor: float) -> Fold:
-    """Costs of a white residual on the scored blocks."""
-    before = _block_costs(scoring.whitener, scoring.before)
+def scored(
+    scoring: Side,
+    vector: FloatArray,
+    fitted: FloatArray,
+    floor: float,
+    without: FloatArray | None = None,
+) -> Fold:
+    """Costs of a white residual on the scored blocks.
+
+    Args:
+        scoring: The blocks.
+        vector: The residual, shape (m,).
+        fitted: That of the fitted blocks.
+        floor: Its cost.
+        without: The residual without what was fitted; None: of all that is compared.
+    """
+    before = _block_costs(scoring.whitener, scoring.before if without is None else without)
     after = _block_costs(scoring.whitener, vector)
     used = np.append(before[:-1] > 1e-9, True)
-    return Fold(before[used], after[used], floor, vector)
+    return Fold(before[used], after[used], floor, vector, fitted)
 
 
 def removed(

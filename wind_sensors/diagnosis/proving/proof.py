@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.proving.held_out import (
     curves,
     fold_of,
     least_left,
+    of_part,
     removed,
     scored,
     side_of,
@@ -56,6 +57,8 @@ class Proof:
             healthy day; None: not asked.
         wind_correlation: Largest correlation of the scored residual with the wind at any lag,
             without and with the effects; None: not asked.
+        own_removed: Share of the excess misfit of the signals that the effects reach: what is wrong
+            with another instrument says nothing of them. None: not asked.
     """
 
     before: float
@@ -69,6 +72,12 @@ class Proof:
     transfer: float | None = None
     coverage: float | None = None
     wind_correlation: tuple[float, float] | None = None
+    own_removed: float | None = None
+
+    @property
+    def removed_where_it_acts(self) -> float:
+        """Share of the excess misfit removed on the signals that the effects reach."""
+        return self.excess_removed if self.own_removed is None else self.own_removed
 
 
 def prove(
@@ -90,6 +99,7 @@ def prove(
     even, odd = (side_of(whitener, station, m) for m in block_masks(whitener.comparison))
     ways = ((even, odd), (odd, even))
     folds = [fold_of(fitting, scoring, station, terms) for fitting, scoring in ways]
+    own = _reached(whitener, terms)
     rng = np.random.default_rng(seed)
     drawn = [
         removed(folds, [rng.integers(0, f.before.size - 1, f.before.size - 1) for f in folds])
@@ -97,7 +107,7 @@ def prove(
     ]
     low, high = np.quantile(drawn, (0.025, 0.975))
     rivals = [fold_of(*way, station, placebo) for way in ways] if placebo else []
-    parameters = sum(p.value_from == "fit" for term in terms for p in term.effect.parameters)
+    parameters = sum(term.fits(p) for term in terms for p in term.effect.parameters)
     smooth = [_curve(*way, parameters) for way in ways]
     size = sum(fold.vector.size for fold in folds)
     series = [f.vector[: _series_size(s)] for f, (_, s) in zip(folds, ways, strict=True)]
@@ -116,7 +126,16 @@ def prove(
             max(_wind_correlation(s, s.before) for _, s in ways),
             max(_wind_correlation(s, f.vector) for f, (_, s) in zip(folds, ways, strict=True)),
         ),
+        own_removed=removed([of_part(f, *way, own) for f, way in zip(folds, ways, strict=True)]),
     )
+
+
+def _reached(whitener: Whitener, terms: Sequence[Term]) -> FloatArray:
+    """One for what is compared of signals that effects reach, nought for the rest, shape (l,)."""
+    comparison = whitener.comparison
+    names = {n for t in terms for n in comparison.affected(comparison.station, t.instrument)}
+    reached = np.array([float(c.instrument in names) for c in comparison.channels])
+    return np.asarray(reached[comparison.channel_of_each])
 
 
 def _instead(folds: Sequence[Fold], others: Sequence[Fold]) -> list[Fold]:
@@ -149,7 +168,7 @@ def _curve(fitting: Side, scoring: Side, parameters: int) -> Fold:
     rows = [curves(side, max(parameters, 1) - 1, [speed_of(side)]) for side in (fitting, scoring)]
     coefficients = np.linalg.lstsq(rows[0].T, fitting.before, rcond=None)[0]
     left = fitting.before - coefficients @ rows[0]
-    return scored(scoring, scoring.before - coefficients @ rows[1], float(left @ left))
+    return scored(scoring, scoring.before - coefficients @ rows[1], left, float(left @ left))
 
 
 def _wind_correlation(side: Side, vector: FloatArray) -> float:

@@ -89,10 +89,10 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     others: it has to stand out instead, and do there what the next-best explanation does.
     """
     proof = next((f.proof for f in findings if f.proof is not None), None)
-    if proof is None or proof.excess_removed > LEAST_REMOVED:
+    if proof is None or proof.removed_where_it_acts > LEAST_REMOVED:
         return True
     noisy = any(f.term.effect.noisy for f in findings)
-    if noisy and proof.after < NOISE_LEFT and proof.excess_removed > LEAST_NOISY_REMOVED:
+    if noisy and proof.after < NOISE_LEFT and proof.removed_where_it_acts > LEAST_NOISY_REMOVED:
         return True
     seldom = any(f.term.interval != ALWAYS or f.term.effect.occasional for f in findings)
     rival = -math.inf if proof.placebo_removed is None else proof.placebo_removed

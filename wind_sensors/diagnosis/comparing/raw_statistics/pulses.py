@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -16,6 +17,15 @@ FloatArray = npt.NDArray[np.float64]
 
 INTERVALS = 6
 """Number of statistics of the pulse intervals."""
+
+LONG = 1.6
+SHORT = 0.4
+"""Intervals over and under so many times their neighbourhood's mean are long and short."""
+
+BETWEEN = 1.3
+USUAL = 0.6
+"""Two intervals that make less than the first together are one with a bounce in it; what is less
+than the second beside a long one belongs to a slot in the wrong place."""
 
 SLOW_TURN = 2.5
 """A rotor that takes so many times longer for its turns than the wind asks for is about to stop:
@@ -83,9 +93,9 @@ def _interval_statistics(
             continue
         interval = (time[i + 1] - time[i]) * window
         counted += 1
-        if interval > 1.6 * around:
+        if interval > LONG * around:
             long += 1
-        elif interval < 0.4 * around:
+        elif interval < SHORT * around:
             short += 1
     if counted < 100:
         return out
@@ -93,6 +103,69 @@ def _interval_statistics(
     out[1] = short / counted
     if slots < 3:
         return out
+    out[2:] = _slot_statistics(time, slots, direction, longest, weight, dt)
+    tracked = _by_slot(time, slots)
+    if tracked.size != time.size or np.any(np.isnan(tracked)):
+        # Of two ways to number the slots, the wrong one makes them look more alike.
+        other = _slot_statistics(tracked, slots, direction, longest, weight, dt)
+        if other[0] ** 2 + 0.5 * other[1] ** 2 > out[2] ** 2 + 0.5 * out[3] ** 2:
+            out[2:] = other
+    return out
+
+
+@compiled
+def _by_slot(time: FloatArray, slots: int) -> FloatArray:
+    """Edges in the order of the disc's slots: without bounces, NaN where one was missed.
+
+    An edge between two others that are about one slot apart bounced; where two are about a whole
+    number of slots apart, with usual ones before and after, the others were missed. A slot that
+    sits in the wrong place makes a short interval and a long one, which are neither.
+
+    Args:
+        time: Edges [s], shape (n,).
+        slots: Per turn.
+    """
+    edges = time.size
+    half = max(5, 2 * (slots // 2) + 1) // 2
+    found = np.full(2 * edges, np.nan)
+    found[0] = time[0]
+    place = 0
+    last = 0
+    before = 1.0
+    for i in range(1, edges - 1):
+        first, final = max(last - half, 0), min(last + half + 1, edges - 1)
+        usual = max((time[final] - time[first]) / (final - first), 1e-9)
+        interval = (time[i] - time[last]) / usual
+        after = (time[i + 1] - time[i]) / usual
+        if interval + after < BETWEEN:
+            continue
+        step = 1
+        if interval > LONG and after > USUAL and before > USUAL:
+            step = round(interval)
+        if place + step >= found.size - 1:
+            break
+        place += step
+        found[place] = time[i]
+        last = i
+        before = interval
+    found[place + 1] = time[edges - 1]
+    return found[: place + 2]
+
+
+@compiled
+def _slot_statistics(
+    time: FloatArray,
+    slots: int,
+    direction: FloatArray,
+    longest: FloatArray,
+    weight: FloatArray,
+    dt: float,
+) -> FloatArray:
+    """Unevenness of the slots, and beats with the wind; NaN stands for an edge that is missing."""
+    out = np.zeros(INTERVALS - 2)
+    edges = time.size
+    bins_per_second = 1.0 / dt
+    last_bin = weight.size - 1
     # By slot: number, deviation, and both times the wind's direction once and twice per turn.
     number = np.zeros((slots, 5))
     total = np.zeros((slots, 5))
@@ -106,6 +179,8 @@ def _interval_statistics(
     for j in range(edges - slots):
         i = j + first
         slot = 0 if slot + 1 == slots else slot + 1
+        if np.isnan(time[i] + time[i + 1] + time[j] + time[j + slots]):
+            continue
         place = min(max(int(time[i] * bins_per_second), 0), last_bin)
         if weight[place] <= 0.5:
             continue
@@ -130,8 +205,8 @@ def _interval_statistics(
     once = (2.0 * np.sum(means * slot_cos) / slots) ** 2
     once += (2.0 * np.sum(means * slot_sin) / slots) ** 2
     once = max(once - 4.0 * error, 0.0)
-    out[2] = math.sqrt(max(np.var(means) - 0.5 * once - error * slots, 0.0))
-    out[3] = math.sqrt(once)
+    out[0] = math.sqrt(max(np.var(means) - 0.5 * once - error * slots, 0.0))
+    out[1] = math.sqrt(once)
     for m in range(2 if slots > 4 else 1):
         if m == 1:
             slot_cos, slot_sin = np.cos(2.0 * angle), np.sin(2.0 * angle)
@@ -140,5 +215,60 @@ def _interval_statistics(
         across = total[:, 2 * m + 2] - means * number[:, 2 * m + 2]
         along = np.sum(slot_cos * away + slot_sin * across)
         aside = np.sum(slot_sin * away - slot_cos * across)
-        out[4 + m] = 2.0 * math.hypot(along, aside) / kept
+        out[2 + m] = 2.0 * math.hypot(along, aside) / kept
     return out
+
+
+FEWEST_IN_A_PART = 3
+"""A part of the record with fewer intervals for each slot does not tell how uneven they are."""
+
+
+def unevenness_in_parts(time: FloatArray, slots: int, cuts: FloatArray) -> FloatArray:
+    """How far the slots' unevenness shows in parts of the record, in units of that of the whole.
+
+    Args:
+        time: Edges [s], ascending.
+        slots: Per turn.
+        cuts: Ends of the parts [s], ascending, shape (parts + 1,).
+
+    Returns:
+        Shape (parts,); NaN where there are too few intervals.
+    """
+    plain, tracked = (
+        _deviations(edges, slots) for edges in (time, np.asarray(_by_slot(time, slots)))
+    )
+    means = [_slot_means(slot, deviation, slots) for _, slot, deviation in (plain, tracked)]
+    right = int(np.var(means[1]) > np.var(means[0]))
+    at, slot, deviation = (plain, tracked)[right]
+    pattern = means[right] - np.mean(means[right])
+    places = np.searchsorted(at, cuts)
+    shown = np.full(cuts.size - 1, np.nan)
+    for k, (i, j) in enumerate(itertools.pairwise(places)):
+        if j - i >= FEWEST_IN_A_PART * slots:
+            there = _slot_means(slot[i:j], deviation[i:j], slots)
+            shown[k] = float(there @ pattern) / max(float(pattern @ pattern), 1e-12)
+    return shown
+
+
+def _slot_means(
+    slot: npt.NDArray[np.intp], deviation: FloatArray, slots: int
+) -> FloatArray:
+    """Mean relative deviation of the intervals that begin at each slot, shape (slots,)."""
+    number = np.maximum(np.bincount(slot, minlength=slots), 1)
+    return np.asarray(np.bincount(slot, deviation, slots) / number)
+
+
+def _deviations(
+    time: FloatArray, slots: int
+) -> tuple[FloatArray, npt.NDArray[np.intp], FloatArray]:
+    """Begin, slot, and relative deviation from a turn's mean, of each interval that is known."""
+    if time.size <= slots + 1:
+        return np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(0)
+    begin = slots // 2
+    count = time.size - slots
+    turn = np.maximum(time[slots:] - time[:count], 1e-9)
+    own = time[begin + 1 : begin + 1 + count] - time[begin : begin + count]
+    deviation = np.clip(own * slots / turn - 1.0, -0.8, 0.8)
+    known = np.isfinite(deviation)
+    slot = (np.arange(count) + begin) % slots
+    return time[begin : begin + count][known], slot[known], deviation[known]

@@ -1,0 +1,54 @@
+"""Fits that ran into the bounds of a parameter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from wind_sensors.diagnosis.effects.definition import Parameter
+from wind_sensors.diagnosis.explaining.fitting import Term
+
+_MARGIN = 0.02
+"""A value is at a bound within this share of the bounds' distance."""
+
+_REACH = 0.85
+"""What multiplies (a gain, an inertia) is at its upper bound from this share of the way on."""
+
+
+def run_away(term: Term) -> frozenset[str]:
+    """Names of the parameters that ended at a bound, where they cannot be."""
+    return frozenset(
+        p.name for p in term.effect.parameters if _is_at_bound(p, term.values[p.name])
+    )
+
+
+def _is_at_bound(parameter: Parameter, value: float) -> bool:
+    margin = _MARGIN * (parameter.high - parameter.low)
+    if parameter.healthy is None:
+        beyond = value > parameter.high - margin
+        if parameter.low == -parameter.high:
+            beyond |= value < parameter.low + margin
+        # A wake as wide as half the horizon is none, nor does a flow past a mast bend more.
+        return beyond and not parameter.wraps and parameter.value_from == "fit"
+    if not parameter.graded or parameter.minimum <= 0.0:
+        return False
+    if parameter.healthy == 1.0 and value > 1.0 + _REACH * (parameter.high - 1.0):
+        return True
+    at_bound = value < parameter.low + margin or value > parameter.high - margin
+    return at_bound and abs(value - parameter.healthy) > margin
+
+
+def without_run_aways(term: Term) -> Term | None:
+    """The term with what ran away held at its healthy value; None: then nothing would be left.
+
+    A parameter that the recording hardly shows follows the errors of the others as far as it may.
+    An effect that contains others would become one of those.
+
+    Args:
+        term: A fitted term.
+    """
+    gone = run_away(term)
+    graded = [p for p in term.effect.parameters if p.graded and p.minimum > 0.0]
+    tied = {p.name: p.healthy for p in graded if p.name in gone and p.healthy is not None}
+    if not gone or term.effect.contains or len(tied) < len(gone) or len(tied) == len(graded):
+        return None
+    return replace(term, values={**term.values, **tied}, held=term.held | gone)
