@@ -22,10 +22,15 @@ LONG = 1.6
 SHORT = 0.4
 """Intervals over and under so many times their neighbourhood's mean are long and short."""
 
+NEIGHBOURS = 10
 BETWEEN = 1.3
+PERHAPS_BETWEEN = 1.7
+PERHAPS_LOST = 1.25
 USUAL = 0.6
-"""Two intervals that make less than the first together are one with a bounce in it; what is less
-than the second beside a long one belongs to a slot in the wrong place."""
+"""Of so many intervals and more around, the median is what usually lies between two edges. Two
+intervals that together make less than `BETWEEN` of it are one with a bounce in it; less than
+`USUAL` beside a long one belongs to a slot in the wrong place. The median is asked for where the
+mean says that two intervals may be one, or that one may be several."""
 
 SLOW_TURN = 2.5
 """A rotor that takes so many times longer for its turns than the wind asks for is about to stop:
@@ -126,28 +131,35 @@ def _by_slot(time: FloatArray, slots: int) -> FloatArray:
         slots: Per turn.
     """
     edges = time.size
-    half = max(5, 2 * (slots // 2) + 1) // 2
+    half = max(NEIGHBOURS, slots) // 2 + 1
     found = np.full(2 * edges, np.nan)
     found[0] = time[0]
     place = 0
     last = 0
     before = 1.0
     for i in range(1, edges - 1):
-        first, final = max(last - half, 0), min(last + half + 1, edges - 1)
-        usual = max((time[final] - time[first]) / (final - first), 1e-9)
-        interval = (time[i] - time[last]) / usual
-        after = (time[i + 1] - time[i]) / usual
-        if interval + after < BETWEEN:
-            continue
+        first = max(min(i - half, edges - 2 * half - 1), 0)
+        around = time[first : min(first + 2 * half + 1, edges)]
+        usual = max((around[-1] - around[0]) / (around.size - 1), 1e-9)
         step = 1
-        if interval > LONG and after > USUAL and before > USUAL:
-            step = round(interval)
+        both = time[i + 1] - time[last]
+        own = time[i] - time[last]
+        if both < PERHAPS_BETWEEN * usual or own > PERHAPS_LOST * usual:
+            # A mean is wrong where several edges bounced or were missed; a median takes time.
+            usual = max(float(np.median(np.diff(around))), 1e-9)
+            if both < BETWEEN * usual:
+                continue
+            after = both - own
+            if i + 2 < edges and time[i + 2] - time[i] < BETWEEN * usual:
+                after = time[i + 2] - time[i]
+            if own > LONG * usual and after > USUAL * usual and before > USUAL * usual:
+                step = round(own / usual)
         if place + step >= found.size - 1:
             break
         place += step
         found[place] = time[i]
         last = i
-        before = interval
+        before = own
     found[place + 1] = time[edges - 1]
     return found[: place + 2]
 

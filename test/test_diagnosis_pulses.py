@@ -1,0 +1,155 @@
+"""What pulses and readings tell by themselves: slots, dead times, and what they rule out."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.comparing.observation import Grid
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
+    interval_statistics,
+    unevenness_in_parts,
+)
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.guesses import guesses_of
+from wind_sensors.diagnosis.explaining.ruled_out import reads_in_its_gap
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.station.model import Cup
+from wind_sensors.station.signals import Pulses
+
+FloatArray = npt.NDArray[np.float64]
+
+SLOTS = 10
+TURNS = 900
+TURN = 0.4
+
+
+def edges(displaced: FloatArray, since: float = 0.0) -> FloatArray:
+    """Edges [s] of a disc that turns every 0.4 s, a little faster and slower, slots displaced [1]
+    from some time on."""
+    place = np.arange(SLOTS * TURNS)
+    even = place / SLOTS * TURN
+    time = even + 0.05 * np.sin(even / 7.0)
+    moved = displaced[place % SLOTS] * TURN / SLOTS
+    return np.asarray(time + np.where(time > since, moved, 0.0))
+
+
+def unevenness(time: FloatArray) -> tuple[float, float]:
+    """Scatter of the slots and what swings once per turn."""
+    grid = Grid(0, 0.1, round(TURNS * TURN / 0.1))
+    cup = STATION.instrument("cup").model_copy(update={"pulses_per_revolution": SLOTS})
+    assert isinstance(cup, Cup)
+    speed = np.full(grid.n, 2.0 * np.pi * cup.calibration_distance / TURN)
+    pulses = Pulses(np.round(time * 1e9).astype(np.int64))
+    found = interval_statistics(pulses, cup, np.zeros(grid.n), speed, grid)
+    return float(found[2]), float(found[3])
+
+
+@pytest.mark.parametrize(
+    ("lost", "bounced", "followed"),
+    [(0.02, 0.0, 0.9), (0.04, 0.0, 0.85), (0.0, 0.04, 0.95), (0.02, 0.02, 0.8)],
+)
+def test_slots_are_followed_past_lost_and_doubled_edges(
+    lost: float, bounced: float, followed: float
+) -> None:
+    records = 40
+    right = 0
+    for seed in range(records):
+        rng = np.random.default_rng(seed)
+        displaced = np.clip(0.06 * rng.standard_normal(SLOTS), -0.2, 0.2)
+        clean = edges(displaced)
+        kept = clean[rng.random(clean.size) >= lost]
+        again = kept[rng.random(kept.size) < bounced] + rng.uniform(0.0005, 0.003)
+        expected, found = unevenness(clean), unevenness(np.sort(np.concatenate((kept, again))))
+        # A wrong count anywhere spreads every slot over all of them, and next to nothing is left.
+        right += found == pytest.approx(expected, abs=0.15 * max(expected))
+    assert right >= followed * records
+
+
+def test_slots_that_become_uneven_show_from_then_on() -> None:
+    displaced = 0.05 * np.random.default_rng(3).standard_normal(SLOTS)
+    cuts = np.linspace(0.0, TURNS * TURN, 13)
+    shown = unevenness_in_parts(edges(displaced, since=120.0), SLOTS, cuts)
+    begin = np.flatnonzero(cuts[:-1] >= 120.0)
+    assert np.abs(shown[: begin[0] - 1]).max() < 0.1 * shown[begin].min()
+
+
+def test_the_beginning_of_uneven_slots_is_part_of_the_finding() -> None:
+    slots = {"scatter": 0.04, "once_per_turn": 0.03}
+    station = with_effect(
+        STATION, catalogue()["encoder_slot_error"], "cup", slots, (220.0, None)
+    )
+    (finding,) = diagnose(recorded(station, 81), baseline()).findings
+    assert finding.term.effect.name == "encoder_slot_error"
+    assert finding.term.interval[0] == pytest.approx(220.0, abs=20.0)
+    assert finding.term.interval[1] is None
+    assert finding.parameters["scatter"].value == pytest.approx(0.04, rel=0.2)
+
+
+DEAD = {"dead_time": 0.0075, "loss_probability": 0.0}
+
+
+def test_a_dead_time_is_read_off_beside_another_gain() -> None:
+    lossy = with_effect(STATION, catalogue()["missed_pulses"], "cup", DEAD)
+    station = with_effect(lossy, catalogue()["calibration_drift"], "cup", {"gain": 1.05})
+    found = diagnose(recorded(station, 82), baseline(), with_proof=False)
+    named = {f.term.effect.name: f.term.values for f in found.findings}
+    assert named["missed_pulses"]["dead_time"] == pytest.approx(0.0075, rel=0.01)
+    assert named["calibration_drift"]["gain"] == pytest.approx(1.05, abs=0.015)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "held"),
+    [
+        ("missed_pulses", DEAD, True),
+        ("calibration_drift", {"gain": 0.85}, False),
+        ("rotor_inertia", {"inertia_factor": 4.0}, False),
+    ],
+)
+def test_only_a_counter_cuts_intervals_off(
+    effect: str, values: dict[str, float], held: bool
+) -> None:
+    station = with_effect(STATION, catalogue()[effect], "cup", values)
+    guesses = guesses_of(prepare(recorded(station, 83)), STATION)
+    terms = guesses.get(("missed_pulses", "cup"), [])
+    assert any(term.held for term in terms) is held
+
+
+def test_a_vane_that_reads_in_steps_has_no_gap_where_it_reads() -> None:
+    coarse = with_effect(
+        STATION, catalogue()["quantisation"], "vane", {"step": 6.0, "origin": 0.0}
+    )
+    gapped = {"centre": 190.0, "width": 40.0, "reading": 0.0, "form": 0.0}
+    gap = catalogue()["potentiometer_gap"]
+    real = prepare(recorded(with_effect(STATION, gap, "vane", gapped), 84))
+    stepped = prepare(recorded(coarse, 84))
+    term = Term(gap, "vane", gapped)
+    assert reads_in_its_gap(stepped, term)
+    assert not reads_in_its_gap(real, term)
+    assert not reads_in_its_gap(stepped, Term(gap, "vane", {**gapped, "form": 2.0}))
+
+
+def test_what_the_recording_does_not_show_is_held_where_it_was() -> None:
+    angular = catalogue()["angular_response"]
+    stray = Term(angular, "cup", {"change": 1.95, "skewness": -1.1})
+    assert run_away(stray) == {"change"}
+    held = without_run_aways(stray)
+    assert held is not None
+    assert held.values == {"change": 0.0, "skewness": -1.1} and held.held == {"change"}
+    assert without_run_aways(Term(angular, "cup", {"change": 1.95, "skewness": 2.0})) is None
+    assert without_run_aways(Term(angular, "cup", {"change": 0.5, "skewness": 0.3})) is None
+    # Ice without weight would be another effect.
+    icing = Term(catalogue()["icing"], "cup", {"gain": 0.9, "inertia_factor": 0.8}, ALWAYS)
+    assert without_run_aways(icing) is None
+
+
+@pytest.mark.parametrize(("breakaway", "noisy"), [(1.0, False), (2.2, True)])
+def test_a_bearing_that_sticks_leaves_noise_of_its_own(breakaway: float, noisy: bool) -> None:
+    values = {"friction_speed": 1.5, "temperature_coefficient": 0.0, "breakaway": breakaway}
+    assert Term(catalogue()["bearing_friction"], "cup", values).leaves_noise is noisy
