@@ -153,3 +153,13 @@ def test_what_the_recording_does_not_show_is_held_where_it_was() -> None:
 def test_a_bearing_that_sticks_leaves_noise_of_its_own(breakaway: float, noisy: bool) -> None:
     values = {"friction_speed": 1.5, "temperature_coefficient": 0.0, "breakaway": breakaway}
     assert Term(catalogue()["bearing_friction"], "cup", values).leaves_noise is noisy
+
+
+def test_slots_are_counted_anew_after_a_silence() -> None:
+    displaced = 0.05 * np.random.default_rng(5).standard_normal(SLOTS)
+    whole = edges(displaced)
+    # Of every record the disc goes on by another number of slots.
+    for lost in range(3 * SLOTS, 4 * SLOTS):
+        silent = (whole > 150.0) & (whole < 210.0)
+        silent[np.flatnonzero(silent)[-1] + 1 + np.arange(lost)] = True
+        assert unevenness(whole[~silent]) == pytest.approx(unevenness(whole), rel=0.1)

@@ -32,6 +32,9 @@ intervals that together make less than `BETWEEN` of it are one with a bounce in 
 `USUAL` beside a long one belongs to a slot in the wrong place. The median is asked for where the
 mean says that two intervals may be one, or that one may be several."""
 
+LOST_TURNS = 10.0
+"""In a silence of so many turns, as they are before and after it, nobody counts slots."""
+
 SLOW_TURN = 2.5
 """A rotor that takes so many times longer for its turns than the wind asks for is about to stop:
 its intervals tell of the wind that it stops in."""
@@ -108,6 +111,7 @@ def _interval_statistics(
     out[1] = short / counted
     if slots < 3:
         return out
+    time = _without_a_silence(time, slots)
     out[2:] = _slot_statistics(time, slots, direction, longest, weight, dt)
     tracked = _by_slot(time, slots)
     if tracked.size != time.size or np.any(np.isnan(tracked)):
@@ -116,6 +120,31 @@ def _interval_statistics(
         if other[0] ** 2 + 0.5 * other[1] ** 2 > out[2] ** 2 + 0.5 * out[3] ** 2:
             out[2:] = other
     return out
+
+
+@compiled
+def _without_a_silence(time: FloatArray, slots: int) -> FloatArray:
+    """The longest stretch of edges in which no pulses are missing for many turns.
+
+    Nobody knows which slot goes on after a silence.
+
+    Args:
+        time: Edges [s], shape (n,).
+        slots: Per turn.
+    """
+    begin = best_begin = best_end = 0
+    for i in range(time.size):
+        end = i + 1 == time.size
+        if not end:
+            # A rotor that comes to rest has slow turns before and after.
+            before = time[i] - time[max(i - slots, begin)]
+            after = time[min(i + 1 + slots, time.size - 1)] - time[i + 1]
+            end = time[i + 1] - time[i] > LOST_TURNS * max(before, after)
+        if end and i > begin:
+            if i - begin > best_end - best_begin:
+                best_begin, best_end = begin, i
+            begin = i + 1
+    return time[best_begin : best_end + 1]
 
 
 @compiled
