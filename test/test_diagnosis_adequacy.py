@@ -213,7 +213,7 @@ def test_a_filter_shows_in_the_power_of_eddies_or_is_none() -> None:
         null = searcher.whitener(searcher.bank.without)
         after = fit(null, STATION, [Term(low_pass, "vane", constant)], None, iterations=0)
         before = no_terms(null, searcher)
-        gained.append(gained_by_eddies(searcher.comparison, before, after))
+        gained.append(gained_by_eddies(null, before, after))
     assert gained[0] > EDDIES_AGAINST
     assert gained[1] < -EDDIES_AGAINST
 

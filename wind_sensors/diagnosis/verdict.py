@@ -17,7 +17,7 @@ from wind_sensors.diagnosis.explaining.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.naming import name
+from wind_sensors.diagnosis.explaining.naming import name, named_alone
 from wind_sensors.diagnosis.explaining.screening import group_templates
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
@@ -37,6 +37,7 @@ from wind_sensors.diagnosis.proving.contradictions import (
 )
 from wind_sensors.diagnosis.proving.decision import (
     REMAINDER_P,
+    Remainder,
     Verdict,
     is_noisy,
     located,
@@ -232,6 +233,119 @@ def _upheld(
     return left, (), f"{names} would fit, but {objection}"
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """An explanation and what is to be said of it.
+
+    Attributes:
+        naming: The explanation.
+        verdict, findings, objection: What is said, and what speaks against it.
+        remainder: What it leaves in the region where it leaves most.
+        excess: Noise over that of healthy days.
+        calm: Whether nobody knows what is normal in such a wind.
+        detectable: Smallest detectable sizes: value, unit, in units of the smallest of interest.
+        bank: Regions.
+        regions_before: The strongest of them without any effect.
+        regions: What is left, for people.
+    """
+
+    naming: Naming
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+    objection: str
+    remainder: Remainder
+    excess: Excess
+    calm: bool
+    detectable: Mapping[str, tuple[float, str, float]]
+    bank: RegionBank
+    regions_before: tuple[Found, ...]
+    regions: tuple[Found, ...]
+
+    @property
+    def is_claim(self) -> bool:
+        """Whether something is named."""
+        return self.verdict in {"named", "ambiguous"}
+
+
+def _judged(
+    searcher: Searcher,
+    naming: Naming,
+    baseline: Baseline,
+    workers: int,
+    report: Callable[[str], Callable[[float], None]],
+    with_proof: bool,
+) -> _Judged:
+    """What is to be said of an explanation.
+
+    Args:
+        searcher: The search that found it.
+        naming: The explanation.
+        baseline: What is normal.
+        workers: Processes.
+        report: Gives a phase's progress function.
+        with_proof: Fit and score held-out blocks.
+    """
+    comparison = searcher.comparison
+    whitener = naming.whitener
+    bank = region_bank(whitener, searcher.bank.without)
+    report("locating")(0.5)
+    before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
+    rest = region_bank(naming.adequate, searcher.bank.without)
+    left = naming.adequate.of(naming.fit.simulated)
+    after = strongest(naming.adequate, rest, left, naming.fit.simulated)
+    remainder = remainder_of(naming, rest, comparison, baseline)
+    detectable = smallest_detectable(searcher, whitener)
+    equal = equal_explanations(naming)
+    located_p = bank.p_value(max(f.score for f in before))
+    excess = _noise_left(naming, baseline)
+    verdict = verdict_of(naming, equal, remainder, detectable, located_p, excess)
+    calm = is_too_calm(comparison, baseline)
+    if calm and verdict != "none" and need_calibration(naming.fit.terms):
+        verdict = "inconclusive"
+    report("proving")(0.2)
+    findings = findings_of(naming, equal, before, bank, baseline, with_proof) if verdict in {
+        "named", "ambiguous"
+    } else ()  # fmt: skip
+    report("proving")(1.0)
+    structured = located(naming, bank, comparison, baseline).is_structure
+    verdict, findings, objection = _upheld(
+        verdict, findings, naming, comparison, baseline.station, structured, workers
+    )
+    if calm and verdict == "unknown":
+        verdict = "inconclusive"
+    if verdict == "unknown" and not objection:
+        suspicion = suspicion_of(naming, baseline.station, workers, beside=True)
+        objection = suspicion.words if suspicion is not None else ""
+    return _Judged(
+        naming=naming,
+        verdict=verdict,
+        findings=findings,
+        objection=objection,
+        remainder=remainder,
+        excess=excess,
+        calm=calm,
+        detectable=detectable,
+        bank=bank,
+        regions_before=tuple(before),
+        regions=tuple(_structured(before) if verdict == "unknown" else after),
+    )
+
+
+def _described(judged: _Judged, baseline: Baseline) -> str:
+    """What is left, and why no name is given, for people."""
+    description = ""
+    if judged.verdict == "unknown" or judged.remainder.p < REMAINDER_P:
+        description = _description(judged.regions[0])
+    if judged.verdict == "unknown" and is_noisy(judged.naming, judged.excess):
+        description = f"{description}; {described(judged.excess)}"
+    if judged.calm and judged.verdict == "inconclusive":
+        description = too_calm(baseline)
+    if judged.objection:
+        said = judged.objection
+        description = f"{description}; {said}" if description else said
+    return description
+
+
 def diagnose(
     recording: Recording,
     baseline: Baseline,
@@ -269,64 +383,34 @@ def diagnose(
         if comparison.misfit_outside(follows, naming.fit.simulated) > TURNING_MISFIT:
             comparison = comparison.within(follows)
             searcher, naming = _explained(comparison, baseline, known, workers, report)
-    whitener = naming.whitener
-    bank = region_bank(whitener, searcher.bank.without)
-    report("locating")(0.5)
-    before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
-    rest = region_bank(naming.adequate, searcher.bank.without)
-    left = naming.adequate.of(naming.fit.simulated)
-    after = strongest(naming.adequate, rest, left, naming.fit.simulated)
-    remainder = remainder_of(naming, rest, comparison, baseline)
-    detectable = smallest_detectable(searcher, whitener)
-    equal = equal_explanations(naming)
-    located_p = bank.p_value(max(f.score for f in before))
-    excess = _noise_left(naming, baseline)
-    verdict = verdict_of(naming, equal, remainder, detectable, located_p, excess)
-    calm = is_too_calm(comparison, baseline)
-    if calm and verdict != "none" and need_calibration(naming.fit.terms):
-        verdict = "inconclusive"
-    report("proving")(0.2)
-    findings = findings_of(naming, equal, before, bank, baseline, with_proof) if verdict in {
-        "named", "ambiguous"
-    } else ()  # fmt: skip
-    report("proving")(1.0)
-    structured = located(naming, bank, comparison, baseline).is_structure
-    verdict, findings, objection = _upheld(
-        verdict, findings, naming, comparison, baseline.station, structured, workers
-    )
-    if calm and verdict == "unknown":
-        verdict = "inconclusive"
-    if verdict == "unknown" and not objection:
-        suspicion = suspicion_of(naming, baseline.station, workers, beside=True)
-        objection = suspicion.words if suspicion is not None else ""
-    named = naming.fit.terms if verdict in {"named", "ambiguous"} else ()
+    judged = _judged(searcher, naming, baseline, workers, report, with_proof)
+    if not judged.is_claim:
+        # A second effect that does not hold must not take the first one along.
+        alone = named_alone(searcher, naming)
+        if alone is not None:
+            single = _judged(searcher, alone, baseline, workers, report, with_proof)
+            judged = single if single.is_claim else judged
+    naming = judged.naming
+    named = naming.fit.terms if judged.is_claim else ()
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)
-    if verdict == "unknown":
-        after = _structured(before)
-    description = ""
-    if verdict == "unknown" or remainder.p < REMAINDER_P:
-        description = _description(after[0])
-    if verdict == "unknown" and is_noisy(naming, excess):
-        description = f"{description}; {described(excess)}"
-    if calm and verdict == "inconclusive":
-        description = too_calm(baseline)
-    if objection:
-        description = f"{description}; {objection}" if description else objection
+    remainder = judged.remainder
     return Diagnosis(
         recording=recording.name,
-        verdict=verdict,
+        verdict=judged.verdict,
         calibrated=baseline.calibrated,
-        findings=findings,
-        unexplained=Unexplained(remainder.p, remainder.share, tuple(after), description),
-        smallest_detectable={k: (v, unit) for k, (v, unit, _) in detectable.items()},
+        findings=judged.findings,
+        unexplained=Unexplained(
+            remainder.p, remainder.share, judged.regions, _described(judged, baseline)
+        ),
+        smallest_detectable={k: (v, unit) for k, (v, unit, _) in judged.detectable.items()},
         station=station,
         baseline=baseline,
         comparison=comparison,
         naming=naming,
         simulated=searcher.bank.without,
         corrected=naming.fit.simulated if named else searcher.bank.without,
-        regions_before=tuple(before),
-        objection=objection,
-        bank=bank,
+        regions_before=judged.regions_before,
+        objection=judged.objection,
+        bank=judged.bank,
     )

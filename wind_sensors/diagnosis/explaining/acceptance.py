@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explaining.bounds import run_away
 from wind_sensors.diagnosis.explaining.explanation import Judged, no_terms, total
@@ -22,30 +21,33 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
 
-ACCEPTED_GAIN = 14.0
+ACCEPTED_GAIN = 12.0
 """Drop of the cost beyond its parameters that a name needs; healthy recordings stay below."""
 
 LOUDEST_FACTOR = 1.2
 """A name needs this many times what the loudest of the healthy recordings promises."""
 
-PASSING_GAIN = 25.0
-"""What an effect must bring that begins or ends inside the record: any of many may do."""
+PASSING_GAIN = 14.0
+"""What an effect must bring that begins or ends inside the record, beyond the cost of its edges."""
 
-PASSING_SMOOTH_GAIN = 40.0
+PASSING_SMOOTH_GAIN = 16.0
 """The same if it smooths: for some minutes the reference sees other eddies than the instrument."""
 
-PASSING_FORM_GAIN = 60.0
+PASSING_FORM_GAIN = 24.0
 """The same with several parameters: in a few minutes of wind from a few directions they fit many a
 wandering of the reference with sizes that undo each other."""
+
+PASSING_FURTHER = 2.0
+"""So many times as much beside another effect: what that leaves is no healthy day's."""
 
 MANY_FORMS = 3
 """So many fitted parameters that have a healthy value count as several, whichever of them says how
 large the effect is: a lean makes of an imbalance what the wind's wandering needs."""
 
-ACCEPTED_FURTHER_GAIN = 32.0
+ACCEPTED_FURTHER_GAIN = 20.0
 """The same for a second effect on the same signals."""
 
-ACCEPTED_ELSEWHERE_GAIN = 22.0
+ACCEPTED_ELSEWHERE_GAIN = 18.0
 """The same for a second effect on signals that the first does not reach."""
 
 FURTHER_SHARE = 0.1
@@ -89,7 +91,8 @@ SMALLEST_BESIDE = 1.8
 
 EDDIES_AGAINST = 10.0
 """What smooths a signal shows in the power of its eddies: there it may not cost more than this,
-whatever the course of the signal gains. True effects bring more than nothing there."""
+whatever the course of the signal gains. True effects bring more than nothing there; a delay does
+not show."""
 
 STALL_SPEED = 4.5
 """Up to this wind speed [m/s] a sticking bearing may hold a rotor."""
@@ -107,16 +110,22 @@ def needed_gain(current: Fit, further: Term, baseline: Baseline) -> float:
     return max(least, LOUDEST_FACTOR * baseline.loudness(further.instrument))
 
 
-def passing_gain(term: Term) -> float:
-    """Gain that a term has to bring for its beginning or end inside the record; else nothing."""
+def passing_gain(term: Term, beside: bool = False) -> float:
+    """Gain that a term has to bring for its beginning or end inside the record; else nothing.
+
+    Args:
+        term: The term.
+        beside: Whether there are others.
+    """
     if term.interval == ALWAYS or term.effect.legible:
         return 0.0
+    times = PASSING_FURTHER if beside else 1.0
     effect = term.effect
     graded = sum(p.healthy is not None and p.minimum > 0.0 for p in effect.parameters)
     shaping = sum(p.healthy is not None and p.value_from == "fit" for p in effect.parameters)
     if graded > 1 or shaping >= MANY_FORMS:
-        return PASSING_FORM_GAIN
-    return PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN
+        return times * PASSING_FORM_GAIN
+    return times * (PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN)
 
 
 def brought(
@@ -143,23 +152,32 @@ def brought(
         return -np.inf
     if too_small(searcher, candidate.fit, total(before)):
         return -np.inf
-    eddies = gained_by_eddies(comparison, before, candidate.fit)
-    if newest.effect.smooths and eddies < -EDDIES_AGAINST:
+    delays = newest.effect.entrance == "clock"
+    eddies = gained_by_eddies(whitener, before, candidate.fit)
+    if newest.effect.smooths and not delays and eddies < -EDDIES_AGAINST:
         return -np.inf
     gain = total(before) - total(candidate.fit)
     gain -= single_event(comparison, before, candidate.fit)
     return min(gain, before_evidence - candidate.evidence)
 
 
-def gained_by_eddies(comparison: Comparison, before: Fit, after: Fit) -> float:
+def gained_by_eddies(whitener: Whitener, before: Fit, after: Fit) -> float:
     """Drop of the cost in the power of eddies: that of the record, and that of its half-minutes.
 
+    Seen in the noise alone: what healthy days allow of other effects would carry what the course of
+    a signal gains over to them.
+
     Args:
-        comparison: The recording.
-        before, after: Two explanations in the same null.
+        whitener: A null.
+        before, after: Two explanations.
     """
+    comparison = whitener.comparison
     channels = len(comparison.channels)
-    gained = np.bincount(comparison.part_of_each, before.vector**2 - after.vector**2)
+    drop = (
+        whitener.noise_whitened(before.simulated) ** 2
+        - whitener.noise_whitened(after.simulated) ** 2
+    )
+    gained = np.bincount(comparison.part_of_each, drop)
     return float(gained[channels : 2 * channels].sum() + gained[3 * channels :].sum())
 
 

@@ -59,6 +59,19 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class Alone:
+    """The single effect that led before others joined it.
+
+    Attributes:
+        terms: It.
+        alternatives: The single effects that lost against it.
+    """
+
+    terms: tuple[Term, ...]
+    alternatives: tuple[Alternative, ...]
+
+
+@dataclass(frozen=True)
 class Naming:
     """The explanation of a recording.
 
@@ -70,6 +83,7 @@ class Naming:
         gain: Drop of the cost.
         alternatives: Losers of the last round, for each accepted term, nearest first.
         screened: Best scores of the first screening: effect, instrument, gain.
+        alone: The single effect from which the search went on; None: there was none.
     """
 
     fit: Fit
@@ -79,6 +93,7 @@ class Naming:
     gain: float
     alternatives: tuple[Alternative, ...] = ()
     screened: tuple[tuple[str, str, float], ...] = field(default=())
+    alone: Alone | None = None
 
 
 def no_terms(whitener: Whitener, searcher: Searcher) -> Fit:

@@ -18,8 +18,9 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import dead_log
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.explaining.intervals import interval_of
+from wind_sensors.diagnosis.explaining.jumps import late_stamps
 from wind_sensors.station.model import Angle, Rotor, Station
-from wind_sensors.station.signals import BoolArray, erratic
+from wind_sensors.station.signals import Angles, BoolArray, Pulses, erratic
 
 FloatArray = npt.NDArray[np.float64]
 Guesses = dict[tuple[str, str], list[Term]]
@@ -136,7 +137,9 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     simulated = comparison.simulate(station)
     for channel in comparison.channels:
         entry = station.instrument(channel.instrument)
+        stamps: Pulses | Angles
         if isinstance(entry, Rotor):
+            stamps = comparison.recording.pulses[entry.name]
             rate = simulated.series[channel.name]
             terms = [
                 *_frictions(comparison, entry),
@@ -146,11 +149,13 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
             ]
         else:
             assert isinstance(entry, Angle)
+            stamps = comparison.recording.angles[entry.name]
             terms = [
                 *_floating(comparison, channel),
                 *_reading_guesses(comparison, channel),
                 *_repeats(comparison, entry),
             ]
+        terms += late_stamps(comparison, entry.name, comparison.grid.seconds(stamps.time))
         for term in terms:
             out.setdefault(term.key, []).append(term)
     return out

@@ -65,7 +65,7 @@ def leader_of(
         newest = one.fit.terms[-1]
         least = max(
             needed_gain(current, newest, searcher.baseline),
-            passing_gain(newest),
+            passing_gain(newest, beside=bool(current.terms)),
             inexactness(searcher, whitener, current, one.fit),
         )
         if brings >= least and told:

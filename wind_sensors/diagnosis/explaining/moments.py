@@ -26,6 +26,10 @@ STEADY_P = 0.05
 parts of so many seconds differs from nought by Student's test at this level. A gust that the
 reference missed brings as much, at once."""
 
+FEW_GUSTS = 2
+GAINS_AGAIN = 40.0
+"""Or it brings so much without so many of its best parts: in a gusty wind gains are gusty, too."""
+
 OF_COURSE = 0.1
 """What brings less than this share of its gain by the course of the signals shows in the statistics
 of the whole record: when it gains, parts do not tell."""
@@ -63,7 +67,9 @@ def is_steady(comparison: Comparison, before: Fit, after: Fit) -> bool:
     inside = gains[(at > begin) & (at < (np.inf if end is None else end))]
     if inside.size < 2:
         return False
-    return float(ttest_1samp(inside, 0.0, alternative="greater").pvalue) < STEADY_P
+    again = float(np.sort(inside)[:-FEW_GUSTS].sum())
+    usual = float(ttest_1samp(inside, 0.0, alternative="greater").pvalue)
+    return usual < STEADY_P or again > GAINS_AGAIN
 
 
 def gain_in_parts(comparison: Comparison, before: Fit, after: Fit, width: int) -> FloatArray:

@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
+    Alone,
     Alternative,
     Judged,
     Naming,
@@ -92,7 +93,10 @@ def name(
         if pair is not None:
             both = pruned(searcher, pair.whitener, pair.fit)
             if len(both.terms) > 1:
-                return _settled(searcher, *swapped(searcher, pair.whitener, both), found.screened)
+                settled = _settled(
+                    searcher, *swapped(searcher, pair.whitener, both), found.screened
+                )
+                return replace(settled, alone=found.alone)
     broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
     if not broad or found.fit.active < BROAD_PARAMETERS:
         return found
@@ -277,7 +281,7 @@ def _greedy(
         for s in searcher.scores(whitener, current.vector)[:12]
     )
     alternatives: tuple[Alternative, ...] = ()
-    alone: tuple[Term, ...] = ()
+    alone = Alone((), ())
     for turn in range(MOST_EFFECTS):
         first = turn == 0
         named = None if first else current
@@ -305,11 +309,11 @@ def _greedy(
             break
         leader = held_throughout(searcher, leader, named)
         current = leader.fit
-        if first:
-            alone = current.terms
         losers = tuple(
             Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not leader
         )
+        if first:
+            alone = Alone(current.terms, losers)
         alternatives = (*alternatives, *losers) if not first else losers
     whitener = searcher.whitener(current.simulated)
     if current.terms:
@@ -317,17 +321,34 @@ def _greedy(
     else:
         current = seen_in(whitener, current)
     if len(current.terms) > 1:
-        known = [alone, *((term,) for a in alternatives for term in a.fit.terms)]
+        known = [alone.terms, *((term,) for a in alternatives for term in a.fit.terms)]
         current = pruned(searcher, whitener, current)
         current = merged(searcher, whitener, current, known, excluded)
         if len(current.terms) > 1:
             current, alternatives = swapped(searcher, whitener, current, excluded)
         else:
             alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
-            current = leading_alone(searcher, current, alone)
+            current = leading_alone(searcher, current, alone.terms)
     if progress:
         progress(1.0)
-    return _settled(searcher, current, alternatives, screened)
+    settled = _settled(searcher, current, alternatives, screened)
+    return replace(settled, alone=alone if alone.terms else None)
+
+
+def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:
+    """The explanation by the single effect that led before a second one joined it.
+
+    Args:
+        searcher: The search.
+        naming: An explanation; None comes back where it is no pair or began with none.
+    """
+    if naming.alone is None or len(naming.fit.terms) < 2:
+        return None
+    whitener = searcher.whitener(searcher.bank.without)
+    single = fit(whitener, searcher.station, naming.alone.terms, searcher.bank.without)
+    whitener = searcher.whitener(single.simulated)
+    single = fit(whitener, searcher.station, single.terms, searcher.bank.without)
+    return _settled(searcher, single, naming.alone.alternatives, naming.screened)
 
 
 def _finalists(

@@ -37,12 +37,12 @@ SHORTEST_WINDOW = 60.0
 """What lasts less [s] tells an effect badly from a gust."""
 
 WINDOW_CANDIDATES = 4
-WINDOW_ADVANTAGE = 15.0
-SMOOTHING_WINDOW_ADVANTAGE = 30.0
-LEAST_WINDOW_GAIN = 24.0
+WINDOW_ADVANTAGE = 12.0
+SMOOTHING_WINDOW_ADVANTAGE = 18.0
+LEAST_WINDOW_GAIN = 20.0
 """What an effect must promise in a part of the record to be fitted there."""
 
-ONSET_GAIN = 25.0
+ONSET_GAIN = 20.0
 """What a beginning or an end of a named effect must bring beyond its cost."""
 
 REFINING_STEPS = (15.0, 4.0, 1.0)
@@ -50,6 +50,13 @@ REFINING_STEPS = (15.0, 4.0, 1.0)
 
 REFINING_REACH = 8
 """So many of them on either side."""
+
+JUMP_REACH = 4.0
+"""Stamps of a clock that begins or stops to be wrong jump within so many seconds [s] of where it
+fits best when the jump itself is left out."""
+
+JUMP_STEP = 0.2
+"""They are placed to this share of a bin: one interval between pulses holds the jump."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +175,7 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
     if without is None:
         return candidate
     best = candidate
+    proposed = {candidate.terms[-1].interval}
     always: Simulated | None = None
     for step in (WINDOW_STEP, *REFINING_STEPS):
         if always is None:
@@ -181,6 +189,7 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
         if window is None:
             break
         interval = interval_of(searcher.comparison, *window)
+        proposed.add(interval)
         if interval in (best.terms[-1].interval, ALWAYS):
             continue
         moved = replace(best.terms[-1], interval=interval)
@@ -189,7 +198,55 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
         )
         if total(trial) < total(best):
             best, always = trial, None
+    if best.terms[-1].effect.entrance == "clock":
+        best = _at_the_jump(searcher, whitener, best, proposed - {ALWAYS})
     return best
+
+
+def _at_the_jump(
+    searcher: Searcher, whitener: Whitener, candidate: Fit, proposed: set[Interval]
+) -> Fit:
+    """The fit with its last term, of a clock, beginning and ending where the stamps jump.
+
+    A jump at another moment than the measured one leaves two, so that only the right moment, within
+    a bin, costs less than a wrong one far away.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        candidate: The fit.
+        proposed: Intervals near which the jumps may be.
+    """
+    comparison = searcher.comparison
+    *fixed, last = candidate.terms
+    best, lowest = last.interval, candidate.cost
+    dt = comparison.grid.dt
+
+    def cost(interval: Interval) -> float:
+        moved = [*fixed, replace(last, interval=interval)]
+        simulated = comparison.possible(planted(searcher.station, moved))
+        if simulated is None:
+            return np.inf
+        vector = whitener.of(simulated)
+        return float(vector @ vector)
+
+    for begins in (True, False):
+        edges = {i[0] if begins else i[1] for i in proposed} - {0.0, None}
+        for reach, step in ((JUMP_REACH, dt), (dt, JUMP_STEP * dt)):
+            steps = round(reach / step)
+            moves = step * np.arange(-steps, steps + 1)
+            places = np.unique(np.round([e + moves for e in edges if e is not None], 3))
+            for place in places.tolist():
+                interval = (place, best[1]) if begins else (best[0], place)
+                reached = cost(interval)
+                if reached < lowest:
+                    best, lowest = interval, reached
+            edges = {best[0] if begins else best[1]} if edges else edges
+    if best == last.interval:
+        return candidate
+    moved = [*fixed, replace(last, interval=best)]
+    trial = fit(whitener, searcher.station, moved, searcher.bank.without, iterations=2)
+    return trial if total(trial) < total(candidate) else candidate
 
 
 def _best_window(

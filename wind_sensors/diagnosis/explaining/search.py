@@ -199,7 +199,8 @@ class Searcher:
         for key, guesses in self.guesses.items():
             if key in chosen:
                 starts = next(s for s in out if s[0].key == key)
-                if self.effects[key[0]].legible or guesses[0].held:
+                effect = self.effects[key[0]]
+                if effect.legible or (guesses[0].held and effect.entrance != "clock"):
                     starts.clear()
                 starts.extend(guesses)
             elif blind or key[0] not in BLIND_EFFECTS:

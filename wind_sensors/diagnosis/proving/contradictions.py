@@ -33,6 +33,12 @@ VARIES_SHARE = 0.03
 record: a size of its own in one of them must not drop the cost by more than this, or than this
 share of the gain."""
 
+CLOCK_VARIES_SHARE = 0.1
+"""A delay's share may be larger: which eddies a reference shares with an instrument changes."""
+
+AT_A_JUMP = 2.0
+"""Where a clock's stamps jump, so many seconds say nothing: pulses on either side share a bin."""
+
 GROWS = 12.0
 GROWS_SHARE = 0.02
 """Nor may a size that grows or shrinks steadily through the record drop it by more than this, or
@@ -141,13 +147,18 @@ def varies(naming: Naming, station: Station) -> bool:
         without = _without(naming, station, term)
         if without is None:
             continue
-        cuts = np.linspace(*window_of(comparison, term.interval), PARTS + 1)
+        begin, end = window_of(comparison, term.interval)
+        large = share
+        if term.effect.entrance == "clock":
+            large = CLOCK_VARIES_SHARE * naming.gain
+            begin, end = begin + AT_A_JUMP, end - AT_A_JUMP
+        cuts = np.linspace(begin, end, PARTS + 1)
         cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
         cells = null.through_standing(in_series(comparison, cells))
         for length in (1, 2, 4):
             parts = cells.reshape(PARTS // length, length, -1).sum(axis=1)
             power = np.maximum(np.einsum("ij,ij->i", parts, parts), 1.0)
-            if np.any((parts @ left) ** 2 / power > max(VARIES, share)):
+            if np.any((parts @ left) ** 2 / power > max(VARIES, large)):
                 return True
         if _drop_by_growth(cells, left) > max(GROWS, GROWS_SHARE * naming.gain):
             return True

@@ -28,8 +28,8 @@ OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
 nothing up or down."""
 
-UNSEEN_GAIN = 100.0
-UNSEEN_NOISY_GAIN = 200.0
+UNSEEN_GAIN = 40.0
+UNSEEN_NOISY_GAIN = 100.0
 """What begins or ends inside the record and brings more need not stand out in a region: what
 changes the quick part of a signal moves none up or down. The second of what acts now and then
 only, and so need not gain all the time."""
