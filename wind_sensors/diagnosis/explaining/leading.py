@@ -32,6 +32,10 @@ from wind_sensors.diagnosis.regions import region_bank
 STANDS_OUT = 0.05
 """Probability, on a healthy day, of the strongest region below which it asks for an explanation."""
 
+NEARLY_AS_WELL = 4.0
+"""What holds throughout explains nearly as much as what begins or ends, beyond what its edges cost,
+if it brings less by no more than this."""
+
 EXPLAINED = 0.5
 """Share of the region's score below which what is left is no more than its noise."""
 
@@ -152,7 +156,7 @@ def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -
     return any(
         other.fit.terms[-1].key == newest.key
         and other.fit.terms[-1].interval == ALWAYS
-        and other.evidence < one.evidence + CLEARLY_BETTER
+        and other.evidence < one.evidence + NEARLY_AS_WELL
         for _, other in others
     )
 
@@ -176,7 +180,7 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
     always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
     (other,) = judged(searcher, [always], named)
-    allowed = -ONSET_GAIN if read else CLEARLY_BETTER
+    allowed = -ONSET_GAIN if read else NEARLY_AS_WELL
     as_well = is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
     return other if as_well else one
 
