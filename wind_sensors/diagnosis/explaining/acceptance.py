@@ -33,9 +33,9 @@ PASSING_GAIN = 14.0
 PASSING_SMOOTH_GAIN = 16.0
 """The same if it smooths: for some minutes the reference sees other eddies than the instrument."""
 
-PASSING_FORM_GAIN = 24.0
+PASSING_FORM_GAIN = 40.0
 """The same with several parameters: in a few minutes of wind from a few directions they fit many a
-wandering of the reference with sizes that undo each other."""
+wandering of the reference with sizes that undo each other (33 on a healthy day)."""
 
 PASSING_FURTHER = 2.0
 """So many times as much beside another effect: what that leaves is no healthy day's."""

@@ -14,9 +14,10 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.noise_level import Excess
-from wind_sensors.diagnosis.regions import RegionBank
+from wind_sensors.diagnosis.regions import Region, RegionBank
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -51,6 +52,11 @@ third: of a large effect the form may leave more."""
 REMAINDER_P = 0.05
 """Nor does a remainder count that a healthy day shows with more probability."""
 
+CHANGED = 30.0
+CHANGED_SHARE = 0.05
+"""An effect changes a signal if it does so by this much, in squares of noise, or by this share of
+what it changes in all of them: a vane that is turned a little carries its propeller along."""
+
 FREELY_BENT = 5
 BENT_REMAINDER_P = 0.01
 """Effects with so many parameters are series that follow whatever goes with direction or heading:
@@ -70,10 +76,12 @@ change, and for twice as many seconds before and after, a residual's noise says 
 LEAST_UNSTIRRED = 0.15
 """Share of the record that must be left for its noise to be judged."""
 
-MOST_FREE_PARAMETERS = 2
+MOST_FREE_PARAMETERS = 1
+FEW_PARAMETERS = 2
 CERTAIN_GAIN = 50.0
-"""An explanation with more parameters that brings less than this must also stand out somewhere in
-the data."""
+FEW_CERTAIN_GAIN = 40.0
+"""An explanation with more parameters than the first that brings less than the third (with no more
+than the second: the fourth) must also stand out somewhere in the data."""
 
 TOO_BLUNT = 6.0
 """A record that shows no effect below this many smallest sizes is inconclusive."""
@@ -117,21 +125,38 @@ def remainder_of(
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
-        reached = {
-            instrument
-            for term in naming.fit.terms
-            for instrument in comparison.affected(comparison.recording.station, term.instrument)
-        }
-        channels = {c.name for c in comparison.channels if c.instrument in reached}
+        channels = _changed(naming)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
         counts = [
             r.channel in channels and not (stirred and r.kind in STIRRED_KINDS)
             for r in bank.regions
         ]
-        scores = np.where(counts, scores, 0.0)
+        outside = [_is_outside(r, naming) for r in bank.regions]
+        scores = np.where(counts, scores, 0.0) * np.where(outside, REMAINDER_SCORE, 1.0)
     score, relative = _largest(scores, bank, comparison, baseline)
     share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
     return Remainder(relative, bank.p_value(score), share)
+
+
+def _changed(naming: Naming) -> set[str]:
+    """Channels that the named effects change, by more than next to nothing."""
+    comparison = naming.adequate.comparison
+    nothing = naming.adequate.noise_whitened(comparison.simulate(comparison.station))
+    change = naming.adequate.noise_whitened(naming.fit.simulated) - nothing
+    squares = np.bincount(comparison.channel_of_each, change**2)
+    least = min(CHANGED, CHANGED_SHARE * float(squares.sum()))
+    return {c.name for c, moved in zip(comparison.channels, squares, strict=True) if moved > least}
+
+
+def _is_outside(region: Region, naming: Naming) -> bool:
+    """Whether a part of the record lies where none of the named effects holds.
+
+    What is left there was there before they began: it has to stand out by itself.
+    """
+    if region.kind != "time":
+        return False
+    windows = [window_of(naming.whitener.comparison, t.interval) for t in naming.fit.terms]
+    return all(region.high <= begin or region.low >= end for begin, end in windows)
 
 
 def _largest(
@@ -228,7 +253,8 @@ def verdict_of(
         if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
             return "inconclusive"
         return "none"
-    asked_for = located_p <= REMAINDER_P or naming.gain > CERTAIN_GAIN
+    certain = CERTAIN_GAIN if naming.fit.active > FEW_PARAMETERS else FEW_CERTAIN_GAIN
+    asked_for = located_p <= REMAINDER_P or naming.gain > certain
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
     sizeable = share > max(REMAINDER_SHARE / max(remainder.score, 1e-9), LEAST_REMAINDER)

@@ -133,8 +133,9 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
     One with more parameters could follow what the simulation is inexact about: if it is behind all
     the same, only the likelihood speaks for it. What contains an effect and fits no better adds
     something to it that the recording does not show. What passes and brings too little to be named
-    by itself is no rival either.
+    by itself is no rival either, nor beside what always holds what would not be named beside it.
     """
+    always = all(t.interval == ALWAYS for t in naming.fit.terms)
     own = [t.key for t in naming.fit.terms]
     share = EQUAL_SHARE if len(own) == 1 else 0.0
     likely = 2.0 * EQUAL_LIKELIHOOD
@@ -149,7 +150,8 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
         newest, rival = alternative.fit.terms[-1], naming.fit.terms[missing[0]]
         if rival.effect.name in newest.effect.contains and alternative.behind > 0.0:
             continue
-        if len(own) == 1 and naming.gain - alternative.behind < passing_gain(newest):
+        least = passing_gain(newest, beside=always)
+        if len(own) == 1 and naming.gain - alternative.behind < least:
             continue
         limit = likely if alternative.fit.active > naming.fit.active else inexact
         if alternative.behind < limit and _alike(naming, alternative):

@@ -38,6 +38,9 @@ PASSING_P = 0.02
 """It stands out below this probability: of the many intervals that were tried one fits a gust."""
 
 SURE_GAIN = 50.0
+SURE_BESIDE_GAIN = 100.0
+"""The same of what acts on the signals of another effect, and so has no region of its own."""
+
 SURE_SIZE = 3.0
 """What brings so much and is so many of the smallest sizes worth reporting is there, whatever the
 intervals of its parameters say."""
@@ -60,7 +63,7 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
     for k, f in enumerate(own):
         alone = not reached[k] & set().union(*reached[:k], *reached[k + 1 :])
-        sure = alone and f.gain > SURE_GAIN
+        sure = f.gain > (SURE_GAIN if alone else SURE_BESIDE_GAIN)
         if f.p > SHOWN_P and f.share < OWN_SHARE and not sure:
             return True
     together = bool(set.intersection(*reached))
