@@ -27,7 +27,13 @@ from wind_sensors.diagnosis.healthy.whitening import form_signatures, trust_of, 
 from wind_sensors.diagnosis.proving.contradictions import is_uneven
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.proving.proof import Proof
-from wind_sensors.diagnosis.proving.support import borne_out, determined, made_up, passes_unseen
+from wind_sensors.diagnosis.proving.support import (
+    UNSEEN_GAIN,
+    borne_out,
+    determined,
+    made_up,
+    passes_unseen,
+)
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.errors import UserError
@@ -237,6 +243,7 @@ LATE = ("timestamp_latency", "vane")
         ((OFFSET, ASYMMETRY), (100.0, 90.0), (0.002, 0.002), True),
         ((OFFSET, LATE), (100.0, 90.0), (0.002, 0.002), False),
         ((OFFSET, ASYMMETRY), (60.0, 30.0), (0.002, 0.4), True),
+        ((OFFSET, ASYMMETRY), (30.0, 110.0), (0.002, 0.4), False),
         ((OFFSET, LATE), (40.0, 70.0), (0.002, 0.4), False),
         ((OFFSET, LATE), (60.0, 45.0), (0.002, 0.4), True),
         ((OFFSET,), (100.0,), (0.4,), False),
@@ -340,7 +347,7 @@ def test_what_begins_or_ends_must_stand_out(
     effect: tuple[str, str], interval: tuple[float, float | None], p: float, unseen: bool
 ) -> None:
     found = _finding(*effect, 0.9, p)
-    passing = replace(found, term=replace(found.term, interval=interval), gain=60.0)
+    passing = replace(found, term=replace(found.term, interval=interval), gain=0.9 * UNSEEN_GAIN)
     assert passes_unseen((passing,)) is unseen
     assert not passes_unseen((replace(passing, gain=600.0),))
     # A rival in an ambiguous set needs no place of its own.

@@ -20,8 +20,9 @@ from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
 from wind_sensors.diagnosis.explaining.moves import merged
 from wind_sensors.diagnosis.explaining.naming import blind_starts, name, named_alone
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
-from wind_sensors.diagnosis.proving.decision import unstirred
+from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORE, remainder_of, unstirred
 from wind_sensors.diagnosis.proving.findings import equal_explanations
+from wind_sensors.diagnosis.regions import region_bank
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Series
 
@@ -260,3 +261,29 @@ def test_a_pair_can_be_judged_by_the_effect_that_led() -> None:
     assert [t.key for t in alone.fit.terms] == [t.key for t in pair.alone.terms]
     assert 0.0 < alone.gain < pair.gain
     assert named_alone(searcher, alone) is None
+
+
+def test_what_is_left_before_an_effect_began_must_stand_out_by_itself() -> None:
+    drifting = catalogue()["calibration_drift"]
+    early = with_effect(STATION, drifting, "cup", {"gain": 1.1}, (0.0, 50.0))
+    searcher = searcher_of(prepare(recorded(early, 94)), baseline(), catalogue(), {})
+    passing = named(searcher, drift((200.0, None)))
+    always = replace(passing, fit=replace(passing.fit, terms=(drift(),)))
+    bank = region_bank(passing.adequate, searcher.bank.without)
+    left = [
+        remainder_of(one, bank, searcher.comparison, baseline()).score for one in (passing, always)
+    ]
+    assert left[1] > 0.5
+    assert left[0] == pytest.approx(REMAINDER_SCORE * left[1])
+
+
+def test_what_a_signal_shows_that_an_effect_hardly_changes_is_not_held_against_it() -> None:
+    turned = with_effect(STATION, catalogue()["vane_offset"], "vane", {"offset": 9.0})
+    both = with_effect(turned, catalogue()["calibration_drift"], "cup", {"gain": 1.03})
+    searcher = searcher_of(prepare(recorded(both, 95)), baseline(), catalogue(), {})
+    bank = region_bank(searcher.whitener(searcher.bank.without), searcher.bank.without)
+    # A gain reaches the cup alone, whatever the vane beside it shows.
+    turn = Term(catalogue()["vane_offset"], "vane", {"offset": 1.0})
+    for term, held in ((drift(), False), (turn, True)):
+        remainder = remainder_of(named(searcher, term), bank, searcher.comparison, baseline())
+        assert (remainder.score > 1.0) is held
