@@ -278,7 +278,7 @@ def test_what_is_left_before_an_effect_began_must_stand_out_by_itself() -> None:
 
 
 def test_what_a_signal_shows_that_an_effect_hardly_changes_is_not_held_against_it() -> None:
-    turned = with_effect(STATION, catalogue()["vane_offset"], "vane", {"offset": 9.0})
+    turned = with_effect(STATION, catalogue()["vane_offset"], "vane", {"offset": 3.0})
     both = with_effect(turned, catalogue()["calibration_drift"], "cup", {"gain": 1.03})
     searcher = searcher_of(prepare(recorded(both, 95)), baseline(), catalogue(), {})
     bank = region_bank(searcher.whitener(searcher.bank.without), searcher.bank.without)
