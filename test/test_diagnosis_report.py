@@ -14,10 +14,11 @@ from wind_sensors.diagnosis.comparing.observing import BANDS
 from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.report.diagnosis_figures import activity_figure, statistics_figure
-from wind_sensors.report.diagnosis_page import page
+from wind_sensors.report.diagnosis_page import page, when_text
 
 
 @lru_cache(maxsize=1)
@@ -103,6 +104,21 @@ def test_the_page_tells_name_size_and_what_is_left() -> None:
     assert "step 8 deg" in text
     assert "Raw signals, vane, vane angle" in text
     assert "usual to" in text
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "interval", "words"),
+    [
+        ("calibration_drift", {"gain": 1.03}, ALWAYS, "all the time"),
+        ("calibration_drift", {"gain": 1.03}, (60.4, None), "from 60 s"),
+        ("calibration_drift", {"gain": 1.03}, (0.0, 300.0), "from 0 s to 300 s"),
+        ("stuck_sensor", {"start": 40.0, "stop": 80.0}, ALWAYS, ""),
+    ],
+)
+def test_people_are_told_when_an_effect_holds(
+    effect: str, values: dict[str, float], interval: Interval, words: str
+) -> None:
+    assert when_text(Term(catalogue()[effect], "cup", values, interval)) == words
 
 
 def test_the_page_tells_why_a_name_was_withdrawn() -> None:

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.diagnosis_files import make_way, write
+from wind_sensors.report.diagnosis_page import when_text
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -99,8 +100,8 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
     console.print(f"[bold]{diagnosis.recording}[/bold]: {diagnosis.verdict}")
     if diagnosis.findings:
         table = Table(box=None)
-        for column in ("effect", "instrument", "size", "95 % interval", "removed on held-out data"):
-            table.add_column(column)
+        for column in ("effect", "instrument", "when", "size", "95 % interval", "held out"):
+            table.add_column(column, overflow="fold")
         for finding in diagnosis.findings:
             removed = ""
             if finding.proof is not None:
@@ -110,11 +111,13 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
                 table.add_row(
                     finding.term.effect.name if k == 0 else "",
                     finding.term.instrument if k == 0 else "",
+                    when_text(finding.term) if k == 0 else "",
                     f"{key} {e.value:.3g}{unit}",
                     f"{e.low:.3g} to {e.high:.3g}",
                     removed if k == 0 else "",
                 )
         console.print(table)
+        console.print("held out: share of the excess misfit removed on data that were not fitted")
     if diagnosis.unexplained.description:
         console.print(f"left over: {diagnosis.unexplained.description}")
     if not diagnosis.calibrated:

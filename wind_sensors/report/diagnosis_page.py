@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
 from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORES
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.proving.proof import Proof
@@ -86,20 +86,25 @@ def _headline(diagnosis: Diagnosis) -> str:
     return VERDICTS[diagnosis.verdict]
 
 
+def when_text(term: Term) -> str:
+    """When an effect holds, for people; nothing where its sizes are its beginning and end."""
+    if term.interval != ALWAYS:
+        begin, end = term.interval
+        return f"from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
+    return "" if "start" in term.values else "all the time"
+
+
 def _summary(diagnosis: Diagnosis) -> str:
     verdict = VERDICTS[diagnosis.verdict]
     lines = [f"<p class='muted'>{escape(verdict)}.</p>"] if diagnosis.findings else []
     for finding in diagnosis.findings:
         term = finding.term
         text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
-        # An effect whose sizes are its beginning and end has said when.
-        when = "" if "start" in term.values else "; all the time"
-        if term.interval != ALWAYS:
-            begin, end = term.interval
-            when = f"; from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
+        when = when_text(term)
+        text += f"; {when}" if when else ""
         lines.append(
             f"<p><b>{escape(words(term.effect.name))}</b>, {escape(term.instrument)}: "
-            f"{escape(term.effect.meaning)}<br>{escape(text)}{when}.</p>"
+            f"{escape(term.effect.meaning)}<br>{escape(text)}.</p>"
         )
     if diagnosis.verdict == "unknown":
         lines.append(f"<p>{escape(diagnosis.unexplained.description)}.</p>")
