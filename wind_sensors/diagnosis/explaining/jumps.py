@@ -74,7 +74,9 @@ def _back_again(time: FloatArray, usual: FloatArray, gap: int, late: float) -> l
     first = gap + AROUND
     begins = time[first:-1]
     within = np.searchsorted(time, begins + late) - np.arange(first, time.size - 1)
-    expected = late / usual[first:]
+    # In a long crowd the median is that of the crowd.
+    before = np.maximum(np.arange(first, time.size - 1) - round(late / usual[gap]) - AROUND, 0)
+    expected = late / np.maximum(usual[first:], usual[before])
     twice = np.where(expected > FEWEST_TWICE, within / expected, 0.0)
     if twice.size == 0:
         return []
