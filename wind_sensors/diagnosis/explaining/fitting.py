@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.simulation.drive import Drive
@@ -94,6 +95,11 @@ class Term:
         return not self.effect.occasional and all(
             p.value_from == "signals" for p in self.effect.parameters
         )
+
+
+def suggested(effect: str, instrument: str, **values: float) -> Term:
+    """A term of the catalogue that always holds, with values to begin a fit from."""
+    return Term(catalogue()[effect], instrument, values)
 
 
 def planted(station: Station, terms: Sequence[Term]) -> Station:

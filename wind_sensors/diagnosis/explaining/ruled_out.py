@@ -6,7 +6,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.fitting import Term
-from wind_sensors.diagnosis.explaining.guesses import headings
+from wind_sensors.diagnosis.explaining.vane_guesses import headings
 
 FLOATS = 2.0
 """Form of a gap in which the reading may be anything."""

@@ -1,0 +1,286 @@
+"""Starting points that a rotor's pulses give away: intervals, silences, stalls, friction."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observing import BANDS
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import unevenness_in_parts
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, suggested
+from wind_sensors.diagnosis.explaining.intervals import interval_of
+from wind_sensors.station.model import Rotor, Station
+
+FloatArray = npt.NDArray[np.float64]
+
+LONGEST_SILENCE = 4.0
+"""A rotor without a pulse for longer [s], while it should turn fast, is taken to be silent."""
+
+STRAY_BESIDE = 10.0
+"""A pulse with more than so many missing before it and after it is a stray one: silence goes on."""
+
+LEAST_SWING = 3.0
+"""Change of temperature [K] from which a bearing may be seen to stiffen."""
+
+BRAKES = (0.5, 2.0, 6.0)
+STIFFENINGS = (-0.03, -0.08, -0.16)
+"""Squared friction speeds at the mean temperature [m^2/s^2] and coefficients [1/K] to begin with:
+the two make up for each other, so that a search for one at a time gets lost."""
+
+HOLDING_FRICTIONS = (1.2, 1.6, 2.0, 2.4)
+BREAKAWAYS = (1.5, 2.2, 3.2, 4.6)
+"""Friction speeds [m/s], and friction at rest relative to that of the turning rotor, to begin with
+where a rotor stands still in the wind: its stops and starts make the cost too rough to search."""
+
+STANDS_STILL = 0.2
+LEAST_HELD = 0.02
+"""Rate [m/s] below which a rotor counts as standing, and share of the record for which a bearing
+that sticks has to hold it."""
+
+PARTS_OF_PULSES = 30
+"""Parts of the record, at whose ends a counter may begin or cease to lose what follows too soon,
+or slots to be uneven."""
+
+PASSING_UNEVENNESS = 1.15
+"""Slots are uneven for a part of the record if that explains so many times as much."""
+
+SHORTEST_SHARE = 0.001
+"""Share of intervals that are shorter than a dead time all the same: pulses of another cause."""
+
+EDGE = 0.03
+SHARP = 6.0
+"""A counter's dead time shows if so many times as many intervals lie just above the shortest,
+within this share of it, as below: a fit of the whole signal would trade it for another gain."""
+
+_RATE_THAT_TURNS = 1.5
+
+
+def rotor_guesses(
+    comparison: Comparison, station: Station, rotor: Rotor, rate: FloatArray
+) -> list[Term]:
+    """Effects that the pulses of a rotor suggest, with starting values.
+
+    Args:
+        comparison: The recording.
+        station: As commissioned.
+        rotor: Gives the pulses.
+        rate: That of the healthy rotor [m/s], at the bins.
+    """
+    return [
+        *_frictions(comparison, rotor),
+        *_sticking(comparison, rotor, rate),
+        *_pulse_guesses(comparison, station, rotor),
+        *_silence(comparison, rotor, rate),
+    ]
+
+
+def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
+    """Bearings that brake alike at the record's mean temperature and change with it differently."""
+    temperature = comparison.drive.temperature
+    if temperature is None or float(np.ptp(temperature)) < LEAST_SWING:
+        return []
+    away = float(np.mean(temperature)) - rotor.reference_temperature
+    return [
+        suggested(
+            "bearing_friction", rotor.name,
+            friction_speed=float(np.sqrt(brake * np.exp(-coefficient * away))),
+            temperature_coefficient=coefficient,
+            breakaway=1.0,
+        )
+        for brake in BRAKES
+        for coefficient in STIFFENINGS
+    ]  # fmt: skip
+
+
+def _sticking(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:
+    """Bearings that hold a rotor where it should turn, and let it go late.
+
+    Args:
+        comparison: The recording.
+        rotor: Gives the pulses.
+        rate: That of the healthy rotor [m/s], at the bins.
+    """
+    measured = comparison.measured.series[f"{rotor.name}/rotor_rate"]
+    held = (measured < STANDS_STILL) & (rate > _RATE_THAT_TURNS)
+    if np.mean(held) < LEAST_HELD:
+        return []
+    return [
+        suggested(
+            "bearing_friction", rotor.name, friction_speed=speed, temperature_coefficient=0.0,
+            breakaway=breakaway,
+        )
+        for speed in HOLDING_FRICTIONS
+        for breakaway in BREAKAWAYS
+    ]  # fmt: skip
+
+
+def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> list[Term]:
+    time = comparison.grid.seconds(comparison.recording.pulses[rotor.name].time)
+    expected, _ = comparison.signals(station, (rotor.name,))
+    expected_time = comparison.grid.seconds(expected[rotor.name].time)
+    if time.size < 100 or expected_time.size < 100:
+        return []
+    interval, usual = np.diff(time), np.diff(expected_time)
+    local = np.interp(time[1:], expected_time[1:], np.convolve(usual, np.ones(9) / 9.0, "same"))
+    relative = interval / np.maximum(local, 1e-9)
+    out = []
+    long = float(np.mean(relative > 1.6))
+    short = float(np.mean(relative < 0.4))
+    usual_long = float(np.mean(usual[1:] > 1.6 * usual[:-1]))
+    dead = _dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual))
+    if long > 0.004 + 2.0 * usual_long and not any(term.held for term in dead):
+        out.append(
+            suggested("missed_pulses", rotor.name, dead_time=0.0, loss_probability=min(long, 0.6))
+        )
+    out.extend(dead)
+    if short > 0.004:
+        delay = float(np.median(interval[relative < 0.4]))
+        out.append(
+            suggested(
+                "extra_pulses", rotor.name,
+                bounce_probability=min(2.0 * short, 0.9),
+                bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
+            )
+        )  # fmt: skip
+    scatter, once = comparison.measured.statistics[f"{rotor.name}/rotor_rate"][
+        BANDS + 2 : BANDS + 4
+    ]
+    slots = rotor.pulses_per_revolution
+    if slots > 2 and max(scatter, once) > 0.01:
+        # An interval is the difference of two slots' displacements.
+        holds, larger = _uneven_span(comparison, time, slots)
+        uneven = suggested(
+            "encoder_slot_error", rotor.name,
+            scatter=larger * float(scatter) / np.sqrt(2.0),
+            once_per_turn=larger * float(once) / (2.0 * np.sin(np.pi / slots)),
+        )  # fmt: skip
+        out.append(replace(uneven, interval=holds))
+    return out
+
+
+def _uneven_span(
+    comparison: Comparison, time: FloatArray, slots: int
+) -> tuple[Interval, float]:
+    """When slots are uneven, and how much more so then than in the mean of the whole record."""
+    length = comparison.grid.n * comparison.grid.dt
+    cuts = np.linspace(0.0, length, PARTS_OF_PULSES + 1)
+    shown = unevenness_in_parts(time, slots, cuts)
+    told = np.isfinite(shown)
+    if not told.any():
+        return ALWAYS, 1.0
+    number = np.concatenate(([0.0], np.cumsum(told)))
+    total = np.concatenate(([0.0], np.cumsum(np.where(told, shown, 0.0))))
+    begin, end = np.triu_indices(cuts.size, 1)
+    within, parts = total[end] - total[begin], np.maximum(number[end] - number[begin], 1.0)
+    # Drop of the sum of squares by one level within a span and nought outside it.
+    drop = within**2 / parts
+    best = int(np.argmax(drop))
+    if drop[best] < PASSING_UNEVENNESS * total[-1] ** 2 / number[-1]:
+        return ALWAYS, 1.0
+    holds = interval_of(comparison, float(cuts[begin[best]]), float(cuts[end[best]]))
+    return holds, float(within[best] / parts[best] / (total[-1] / number[-1]))
+
+
+def _dead_times(
+    comparison: Comparison,
+    rotor: Rotor,
+    recorded: tuple[FloatArray, FloatArray],
+    expected: tuple[FloatArray, FloatArray],
+) -> list[Term]:
+    """Dead times without which there would be shorter intervals, all the time or in a part of it.
+
+    Args:
+        comparison: The recording.
+        rotor: Gives the pulses.
+        recorded, expected: End [s since the first bin] and length [s] of each interval.
+    """
+    length = comparison.grid.n * comparison.grid.dt
+    cuts = np.linspace(0.0, length, PARTS_OF_PULSES + 1)
+    found = [_sorted_between(cuts, *recorded), _sorted_between(cuts, *expected)]
+    shortest_few = [
+        cell[: int(SHORTEST_SHARE * recorded[1].size) + 1] for cell in found[0]
+    ]  # fmt: skip
+    best: tuple[int, float, Interval] | None = None
+    # The whole record comes first, then what begins or ends in it: a part of it must miss more.
+    for begin, end in sorted(
+        itertools.combinations(range(PARTS_OF_PULSES + 1), 2),
+        key=lambda span: (span[0] > 0) + (span[1] < PARTS_OF_PULSES),
+    ):
+        intervals = sum(cell.size for cell in found[0][begin:end])
+        usual = sum(cell.size for cell in found[1][begin:end])
+        if intervals < 100 or usual < 100:
+            continue
+        few = np.concatenate(shortest_few[begin:end])
+        rank = int(SHORTEST_SHARE * intervals)
+        shortest = float(np.partition(few, rank)[rank])
+        missing = sum(int(np.searchsorted(cell, 0.97 * shortest)) for cell in found[1][begin:end])
+        if missing > 0.004 * usual and (best is None or missing > best[0]):
+            best = missing, shortest, interval_of(comparison, cuts[begin], cuts[end])
+    if best is None:
+        return []
+    _, shortest, holds = best
+    told = _is_sharp(np.concatenate(found[0]), shortest)
+    return [
+        replace(
+            suggested(
+                "missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0
+            ),
+            interval=holds,
+            held=frozenset({"dead_time"}) if told else frozenset(),
+        )
+        for share in ((1.0,) if told else (1.0, 0.9))
+    ]
+
+
+def _is_sharp(intervals: FloatArray, shortest: float) -> bool:
+    """Whether many intervals are a little longer than the shortest, and hardly any a little less.
+
+    The end of a distribution that the wind makes thins out; a counter cuts it off.
+    """
+    near = np.abs(intervals / shortest - 1.0) < EDGE
+    above = np.count_nonzero(near & (intervals > shortest))
+    return bool(above > SHARP * np.count_nonzero(near & (intervals <= shortest)))
+
+
+def _sorted_between(cuts: FloatArray, at: FloatArray, values: FloatArray) -> list[FloatArray]:
+    """Values between neighbouring cuts, each lot ascending; `at` ascends."""
+    places = np.searchsorted(at, cuts)
+    return [np.sort(values[i:j]) for i, j in itertools.pairwise(places)]
+
+
+def _run(holds: npt.NDArray[np.bool_], place: int) -> tuple[int, int]:
+    """First and last place of the run without a break around a place, which counts in any case."""
+    breaks = np.flatnonzero(~holds)
+    before, after = breaks[breaks < place], breaks[breaks > place]
+    first = int(before[-1]) + 1 if before.size else 0
+    last = int(after[0]) - 1 if after.size else holds.size - 1
+    return first, last
+
+
+def _silence(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:
+    time = comparison.grid.seconds(comparison.recording.pulses[rotor.name].time)
+    length = comparison.grid.n * comparison.grid.dt
+    edges = np.concatenate(([0.0], np.clip(time, 0.0, length), [length]))
+    gaps = np.diff(edges)
+    longest = int(np.argmax(gaps))
+    turned = np.concatenate(([0.0], np.cumsum(rate) * comparison.grid.dt))
+    turned /= 2.0 * np.pi * rotor.calibration_distance
+    missed = np.diff(np.interp(edges, comparison.grid.edges, turned)) * rotor.pulses_per_revolution
+    first, last = _run(missed > STRAY_BESIDE, longest)
+    begin, end = float(edges[first]), float(edges[last + 1])
+    if end - begin < LONGEST_SILENCE:
+        return []
+    inside = rate[int(begin / comparison.grid.dt) : int(end / comparison.grid.dt)]
+    if inside.size == 0 or np.median(inside) < _RATE_THAT_TURNS:
+        return []
+    since = comparison.drive.elapsed
+    return [
+        suggested(
+            "stuck_sensor", rotor.name,
+            start=begin + since, stop=end + since, reading=0.0, known=0.0,
+        )
+    ]  # fmt: skip

@@ -1,0 +1,220 @@
+"""Starting points that a vane's readings give away: steps, gaps, repeats."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observation import Channel
+from wind_sensors.diagnosis.explaining.fitting import Term, suggested
+from wind_sensors.diagnosis.explaining.intervals import interval_of
+from wind_sensors.station.model import Angle
+from wind_sensors.station.signals import BoolArray, erratic
+
+FloatArray = npt.NDArray[np.float64]
+
+LONGEST_REPEAT = 4.0
+"""A vane that repeats one reading for longer [s] in a wind that turns it is taken to be stuck."""
+
+LEAST_ERRATIC = 0.004
+"""Share of erratic readings from which a gap with a floating wiper is considered."""
+
+NARROWER = (1.0, 0.65, 0.4)
+"""Widths to begin with, in widths of the sector where the nose should have been: the reference
+does not tell that within some degrees."""
+
+REPEATED = 6.0
+LEAST_REPEATS = 20
+FEWEST_STEPS = 3
+SMOOTHED_READINGS = 101
+SHORTEST_COARSE = 60.0
+"""Readings that come so many times as often as others, and so often, are coarse: at least three
+different ones, most of so many readings in a row, for so long [s]."""
+
+
+def vane_guesses(comparison: Comparison, channel: Channel, vane: Angle) -> list[Term]:
+    """Effects that the readings of a vane suggest, with starting values.
+
+    Args:
+        comparison: The recording.
+        channel: The vane's.
+        vane: Gives the readings.
+    """
+    return [
+        *_floating(comparison, channel),
+        *_reading_guesses(comparison, channel),
+        *_repeats(comparison, vane),
+    ]
+
+
+def _repeats(comparison: Comparison, vane: Angle) -> list[Term]:
+    readings = comparison.recording.angles[vane.name]
+    time = comparison.grid.seconds(readings.time)
+    if time.size < 50:
+        return []
+    changed = np.flatnonzero(np.abs(np.diff(readings.angle)) > 1e-9) + 1
+    starts = np.concatenate(([0], changed))
+    stops = np.concatenate((changed, [time.size])) - 1
+    lasting = time[stops] - time[starts]
+    longest = int(np.argmax(lasting))
+    usual = float(np.quantile(lasting, 0.98))
+    if lasting[longest] < max(LONGEST_REPEAT, 4.0 * usual):
+        return []
+    since = comparison.drive.elapsed
+    return [
+        suggested(
+            "stuck_sensor", vane.name,
+            start=float(time[starts[longest]]) + since, stop=float(time[stops[longest]]) + since,
+            reading=float(np.degrees(readings.angle[starts[longest]])), known=1.0,
+        )
+    ]  # fmt: skip
+
+
+def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
+    vane = channel.instrument
+    delivered = comparison.recording.angles[vane].angle
+    readings = delivered[np.isfinite(delivered)]
+    if readings.size < 200:
+        return []
+    out = []
+    degrees = np.degrees(readings)
+    values, counts = np.unique(np.round(degrees, 4), return_counts=True)
+    steps = np.diff(values)
+    steps = steps[steps > 0.02]
+    if values.size < 0.25 * readings.size and steps.size > 1:
+        step = float(np.median(steps[steps < 1.5 * np.quantile(steps, 0.2) + 1e-9]))
+        if np.sum(counts) / values.size > 8.0 and step > 0.3:
+            turns = np.exp(2j * np.pi * values / step)
+            origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
+            out.append(suggested("quantisation", vane, step=step, origin=origin))
+    if not out:
+        out.extend(_coarse_for_a_while(comparison, vane))
+    common = values[counts > max(0.004 * readings.size, 20)]
+    hole = _hole(degrees)
+    if hole is not None:
+        out.append(_gap(vane, *hole))
+    if 1 <= common.size <= 3:
+        low, high = float(common.min()), float(common.max())
+        if common.size == 1:
+            beside = [(low + 5.0 * side, 10.0) for side in (-1.0, 1.0)]
+            there = np.abs(np.degrees(delivered) - low) < 1e-3
+            sectors = [_sector(comparison, channel, there), *([hole] if hole else beside)]
+            out.extend(_gap(vane, *sector, 1, low) for sector in sectors)
+            out.extend(_gap(vane, *sector) for sector in sectors)
+        else:
+            width = high - low
+            centre = 0.5 * (low + high)
+            if width > 180.0:
+                width, centre = 360.0 - width, centre + 180.0
+            if width < 90.0:
+                out.append(_gap(vane, centre, width))
+    return out
+
+
+def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
+    """Quantisation in the longest part of the record in which readings repeat a few values."""
+    readings = comparison.recording.angles[vane]
+    told = np.isfinite(readings.angle)
+    degrees = np.round(np.degrees(readings.angle[told]), 4)
+    time = comparison.grid.seconds(readings.time[told])
+    values, place, counts = np.unique(degrees, return_inverse=True, return_counts=True)
+    repeated = counts > max(REPEATED * degrees.size / values.size, LEAST_REPEATS)
+    if np.count_nonzero(repeated) < FEWEST_STEPS:
+        return []
+    coarse = repeated[place]
+    usual = uniform_filter1d(coarse.astype(np.float64), SMOOTHED_READINGS) > 0.5
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], usual, [False])).astype(np.int8)))
+    begin, end = max(
+        zip(edges[::2], edges[1::2], strict=True), key=lambda run: float(run[1] - run[0])
+    )
+    inside = np.unique(degrees[begin:end][coarse[begin:end]])
+    if inside.size < FEWEST_STEPS or time[end - 1] - time[begin] < SHORTEST_COARSE:
+        return []
+    step = float(np.median(np.diff(inside)))
+    turns = np.exp(2j * np.pi * inside / step)
+    origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
+    holds = interval_of(comparison, float(time[begin]), float(time[end - 1]))
+    return [replace(suggested("quantisation", vane, step=step, origin=origin), interval=holds)]
+
+
+def _gap(
+    vane: str, centre: float, width: float, form: int = 0, reading: float = 0.0
+) -> Term:
+    return suggested(
+        "potentiometer_gap", vane, centre=centre, width=width, reading=reading, form=float(form)
+    )
+
+
+def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
+    """A gap where readings jump about, in the sector in which they do."""
+    wrong = erratic(comparison.recording.angles[channel.instrument])
+    if np.mean(wrong) < LEAST_ERRATIC:
+        return []
+    centre, width = _sector(comparison, channel, wrong)
+    sectors = [(centre, share * width) for share in NARROWER]
+    return [
+        _gap(channel.instrument, *sector, 2)
+        for sector in (*_mostly(comparison, channel, wrong, centre), *sectors)
+    ]
+
+
+def _mostly(
+    comparison: Comparison, channel: Channel, where: BoolArray, inside: float
+) -> list[tuple[float, float]]:
+    """Centre and width of the sector in which some readings outnumber others [deg]."""
+    away = np.degrees(headings(comparison, channel)) - inside
+    away = np.mod(away + 180.0, 360.0) - 180.0
+    bins = np.arange(-180.0, 181.0)
+    some, _ = np.histogram(away[where], bins)
+    every, _ = np.histogram(away, bins)
+    most = 2 * some > every
+    if not most[180]:
+        return []
+    # No reading says nothing of a degree; the last ones that speak for the sector bound it.
+    others = np.flatnonzero((every > 0) & ~most)
+    low, high = others[others < 180].max(initial=-1) + 1, others[others > 180].min(initial=360)
+    spoken = low + np.flatnonzero(most[low:high])
+    low, high = int(spoken[0]), int(spoken[-1]) + 1
+    return [(inside + 0.5 * (low + high) - 180.0, float(high - low))]
+
+
+def headings(comparison: Comparison, channel: Channel) -> FloatArray:
+    """Where the nose should be at each reading [rad]."""
+    time = comparison.recording.angles[channel.instrument].time
+    heading = comparison.direction + comparison.expected.get(channel.name, 0.0)
+    return np.interp(comparison.grid.seconds(time), comparison.grid.centres, heading)
+
+
+def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple[float, float]:
+    """Centre and width of the sector in which the nose should be at some readings [deg]."""
+    at = headings(comparison, channel)[where]
+    centre = float(np.angle(np.mean(np.exp(1j * at))))
+    away = np.angle(np.exp(1j * (at - centre)))
+    low, middle, high = np.degrees(np.quantile(away, (0.1, 0.5, 0.9)))
+    return float(np.degrees(centre) + middle), float(np.clip(high - low, 3.0, 90.0))
+
+
+def _hole(degrees: FloatArray) -> tuple[float, float] | None:
+    """Centre and width of a sector without readings between sectors with many [deg]."""
+    counts, _ = np.histogram(np.mod(degrees, 360.0), bins=360, range=(0.0, 360.0))
+    # A reading that comes again and again is no wind.
+    counts = np.minimum(counts, 5.0 * np.median(counts[counts > 0]))
+    beside = np.convolve(np.concatenate((counts[-20:], counts, counts[:20])), np.ones(20), "valid")
+    below, above = beside[:360], beside[21:381]
+    least = 0.015 * np.sum(counts)
+    empty = (counts < 0.03 * (below + above) / 40.0) & (below > least) & (above > least)
+    if not empty.any():
+        return None
+    doubled = np.concatenate((empty, empty))
+    best, run, at = 0, 0, 0
+    for k, is_empty in enumerate(doubled):
+        run = run + 1 if is_empty else 0
+        if run > best:
+            best, at = run, k
+    if best < 3 or best > 60:
+        return None
+    return float((at - 0.5 * best + 0.5) % 360.0), float(best)
