@@ -19,6 +19,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.diagnosis_files import make_way, write
 from wind_sensors.report.diagnosis_page import when_text
+from wind_sensors.report.sizes import sizes_of
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -106,14 +107,13 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
             removed = ""
             if finding.proof is not None:
                 removed = f"{100.0 * finding.proof.excess_removed:.0f} %"
-            for k, (key, e) in enumerate(finding.parameters.items()):
-                unit = "" if e.unit == "1" else f" {e.unit}"
+            for k, size in enumerate(sizes_of(finding, diagnosis.station)):
                 table.add_row(
                     finding.term.effect.name if k == 0 else "",
                     finding.term.instrument if k == 0 else "",
                     when_text(finding.term) if k == 0 else "",
-                    f"{key} {e.value:.3g}{unit}",
-                    f"{e.low:.3g} to {e.high:.3g}",
+                    f"{size.name} {size.value} {size.unit}".rstrip(),
+                    f"{size.low} to {size.high}" if size.low else "",
                     removed if k == 0 else "",
                 )
         console.print(table)

@@ -11,7 +11,7 @@ import numpy as np
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
 from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORES
-from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import OF_POWER, Found
 from wind_sensors.diagnosis.verdict import Diagnosis
@@ -22,6 +22,8 @@ from wind_sensors.report.diagnosis_figures import (
     residual_figure,
     statistics_figure,
 )
+from wind_sensors.report.sizes import number_text, sizes_of, words
+from wind_sensors.station.model import Station
 
 STYLE = """
 :root{--ink:#22303c;--muted:#5d6b77;--line:#e3e8ec;--blue:#1f6fb2;--orange:#b96a1c;--green:#3d7f52}
@@ -55,25 +57,6 @@ VERDICTS = {
 }
 
 
-def words(effect: str) -> str:
-    """An identifier for people."""
-    return effect.replace("_", " ")
-
-
-def number_text(value: float) -> str:
-    """Three digits."""
-    return f"{value:.3g}" if np.isfinite(value) else "?"
-
-
-def estimate_text(name: str, e: Estimate) -> str:
-    """A parameter with its unit and interval."""
-    unit = "" if e.unit == "1" else f" {e.unit}"
-    interval = ""
-    if np.isfinite(e.low):
-        interval = f" ({number_text(e.low)} to {number_text(e.high)})"
-    return f"{words(name)} {number_text(e.value)}{unit}{interval}"
-
-
 def _headline(diagnosis: Diagnosis) -> str:
     if diagnosis.findings and diagnosis.verdict == "named":
         names = " and ".join(
@@ -99,7 +82,7 @@ def _summary(diagnosis: Diagnosis) -> str:
     lines = [f"<p class='muted'>{escape(verdict)}.</p>"] if diagnosis.findings else []
     for finding in diagnosis.findings:
         term = finding.term
-        text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
+        text = "; ".join(size.text for size in sizes_of(finding, diagnosis.station))
         when = when_text(term)
         text += f"; {when}" if when else ""
         lines.append(
@@ -125,13 +108,13 @@ def _summary(diagnosis: Diagnosis) -> str:
     return "".join(lines)
 
 
-def _physics(finding: Finding) -> str:
+def _physics(finding: Finding, station: Station) -> str:
     effect = finding.term.effect
     rows = "".join(
-        f"<tr><td>{escape(words(key))}</td><td class='n'>{number_text(e.value)}</td>"
-        f"<td class='n'>{number_text(e.low)} to {number_text(e.high)}</td>"
-        f"<td>{escape(e.unit)}</td></tr>"
-        for key, e in finding.parameters.items()
+        f"<tr><td>{escape(size.name)}</td><td class='n'>{size.value}</td>"
+        f"<td class='n'>{f'{size.low} to {size.high}' if size.low else ''}</td>"
+        f"<td>{escape(size.unit)}</td></tr>"
+        for size in sizes_of(finding, station)
     )
     region = finding.located.region
     return (
@@ -300,7 +283,7 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         "healthy days show.</p>"
         + "".join(figures)
         + "</section>",
-        *(_physics(f) for f in diagnosis.findings),
+        *(_physics(f, diagnosis.station) for f in diagnosis.findings),
         *(_proof(f) for f in diagnosis.findings[:1]),
         _next(diagnosis),
         _left(diagnosis),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from html import escape
 
@@ -11,13 +12,9 @@ from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
 from wind_sensors.report.cuts import in_both_cuts, title_for
-from wind_sensors.report.diagnosis_page import (
-    VERDICTS,
-    document,
-    estimate_text,
-    number_text,
-    words,
-)
+from wind_sensors.report.diagnosis_page import VERDICTS, document
+from wind_sensors.report.sizes import number_text, sizes_of, words
+from wind_sensors.station.model import Station
 
 
 def panel_figure(panels: list[Panel], width: float) -> Figure:
@@ -39,38 +36,70 @@ def panel_figure(panels: list[Panel], width: float) -> Figure:
     return figure
 
 
-def _finding(finding: Finding) -> str:
-    effect = finding.term.effect
-    text = "; ".join(estimate_text(k, e) for k, e in finding.parameters.items())
+def _effects(findings: Sequence[Finding], station: Station) -> str:
+    """One section for each effect, with all the instruments it was found on."""
+    groups: dict[str, list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault(finding.term.effect.name, []).append(finding)
+    return "".join(_effect(group, station) for group in groups.values())
+
+
+def _effect(findings: Sequence[Finding], station: Station) -> str:
+    effect = findings[0].term.effect
+    rivals = {name for f in findings for name, _, _ in f.alternatives}
+    others = "".join(
+        f"<li>against {escape(words(name))}: {escape(measure)}</li>"
+        for name, measure in effect.confusable.items()
+        if name in rivals
+    )
+    return (
+        f"<section><h2>{escape(words(effect.name))}</h2><p>{escape(effect.meaning)}</p>"
+        f"<span class='eq'>{escape(effect.equation)}</span>"
+        f"<p class='muted'>{escape(effect.source)}</p>"
+        + "".join(_finding(f, station) for f in findings)
+        + (f"<p>What would tell more:</p><ul>{others}</ul>" if others else "")
+        + "</section>"
+    )
+
+
+def _finding(finding: Finding, station: Station) -> str:
     together = (
-        f" <b>(one of set {finding.set_number}: the data do not say which)</b>"
+        f" (one of set {finding.set_number}: the data do not say which)"
         if finding.set_number
         else ""
     )
+    located = finding.located
+    mismatch = (
+        f"; mismatch there {number_text(located.excess)} {escape(located.unit)}"
+        if located.excess
+        else ""
+    )
+    sizes = "; ".join(size.text for size in sizes_of(finding, station))
     proof = ""
     if finding.proof is not None:
         p = finding.proof
         proof = (
-            f"<p>On blocks that were not fitted it removes <b>{100.0 * p.excess_removed:.0f} %</b> "
+            f"<br>On blocks that were not fitted it removes "
+            f"<b>{100.0 * p.excess_removed:.0f} %</b> "
             f"({100.0 * p.low:.0f} to {100.0 * p.high:.0f} %) of the misfit that was there; "
-            f"residual {p.before:.2f} before, {p.after:.2f} after, in units of its noise.</p>"
+            f"residual {p.before:.2f} before, {p.after:.2f} after, in units of its noise."
         )
-    others = "".join(
-        f"<li>against {escape(words(name))}: {escape(measure)}</li>"
-        for name, measure in effect.confusable.items()
-        if name in {a for a, _, _ in finding.alternatives}
-    )
     return (
-        f"<section><h2>{escape(words(effect.name))}: {escape(finding.term.instrument)}"
-        f"{together}</h2><p>{escape(effect.meaning)} {escape(text)}.</p>"
-        f"<span class='eq'>{escape(effect.equation)}</span>"
-        f"<p class='muted'>{escape(effect.source)}</p>"
-        f"<p>Where: {escape(finding.located.region.label)}; mismatch there "
-        f"{number_text(finding.located.excess)} {escape(finding.located.unit)}; "
-        f"p = {finding.p:.3g}.</p>{proof}"
-        + (f"<p>What would tell more:</p><ul>{others}</ul>" if others else "")
-        + "</section>"
+        f"<p><b>{escape(finding.term.instrument)}</b>{together}: {escape(sizes)}.<br>"
+        f"Where: {escape(located.region.label)}{mismatch}; p = {finding.p:.3g}.{proof}</p>"
     )
+
+
+def _headline(outcome: Outcome) -> str:
+    """The named effects, each with its instruments."""
+    instruments: dict[str, dict[str, None]] = {}
+    for finding in outcome.findings:
+        if finding.set_number == 0:
+            name = words(finding.term.effect.name)
+            instruments.setdefault(name, {})[finding.term.instrument] = None
+    named = "; ".join(f"{name} ({', '.join(on)})" for name, on in instruments.items())
+    headline = named or VERDICTS[outcome.verdict]
+    return headline[0].upper() + headline[1:]
 
 
 def _list(title: str, lines: tuple[str, ...]) -> str:
@@ -82,12 +111,6 @@ def _list(title: str, lines: tuple[str, ...]) -> str:
 
 def outcome_page(outcome: Outcome) -> str:
     """The report as one HTML file without outside references."""
-    names = dict.fromkeys(
-        f"{words(f.term.effect.name)} ({f.term.instrument})"
-        for f in outcome.findings
-        if f.set_number == 0
-    )
-    headline = "; ".join(names) or VERDICTS[outcome.verdict]
     titles = list(dict.fromkeys(p.title for p in outcome.panels))
     figures = "".join(
         in_both_cuts(partial(panel_figure, [p for p in outcome.panels if p.title == title]), title)
@@ -106,10 +129,10 @@ def outcome_page(outcome: Outcome) -> str:
     body = [
         f"<header class='verdict {outcome.verdict}'><div class='muted'>"
         f"{escape(outcome.recording)} · wind diagnose</div>"
-        f"<h1>{escape(headline[0].upper() + headline[1:])}</h1>"
+        f"<h1>{escape(_headline(outcome))}</h1>"
         f"<p class='muted'>{escape(VERDICTS[outcome.verdict])}. Reference: "
         f"{escape(outcome.reference)}. {escape(calibrated)}</p></header>",
-        *(_finding(f) for f in outcome.findings),
+        _effects(outcome.findings, outcome.station),
         f"<section><h2>Before and after</h2><p class='muted'>Orange: recorded minus simulated as "
         f"described; bars are two standard errors. Blue: with the named physics.</p>{figures}"
         "</section>" if figures else "",

@@ -77,6 +77,8 @@ class Comparison(View):
         measured: Of the recording.
         place: Where the reference stands; None: unknown.
         memory: What instruments did in `drive`; None: nothing is kept.
+        repeated: Share of the reference's samples that only repeated those before them, and were
+            left out.
     """
 
     recording: Recording
@@ -84,6 +86,7 @@ class Comparison(View):
     measured: Simulated
     place: Place | None = None
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
+    repeated: float = 0.0
     _simulated: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
@@ -19,6 +21,34 @@ BESIDE_GAP = 1.0
 
 EDGE = 9
 """Weights rise and fall within so many bins."""
+
+
+def without_repeats(recording: Recording) -> tuple[Recording, float]:
+    """A recording whose sonic says nothing where it repeats the same wind for too long.
+
+    A driver that fills gaps with the last good wind hides them: nothing blows to the last digit
+    alike. A tunnel's wind and a simulator's may.
+
+    Args:
+        recording: With a reference or without.
+
+    Returns:
+        The recording, and the share of the reference's samples that were taken out of it.
+    """
+    reference, entry = recording.reference, recording.station.reference
+    if reference is None or entry is None or entry.kind != "sonic" or reference.time.size < 2:
+        return recording, 0.0
+    changed = np.any(np.diff(reference.velocity, axis=0) != 0.0, axis=1)
+    number = np.concatenate(([0], np.cumsum(changed)))
+    first, count = np.unique(number, return_index=True, return_counts=True)[1:]
+    lasting = (reference.time[first + count - 1] - reference.time[first]) * 1e-9 > LONGEST_GAP
+    repeated = lasting[number]
+    repeated[first] = False
+    if not repeated.any():
+        return recording, 0.0
+    velocity = np.where(repeated[:, None], np.nan, reference.velocity)
+    silent = replace(reference, velocity=velocity)
+    return replace(recording, reference=silent), float(np.mean(repeated))
 
 
 def where_reference_is(recording: Recording, grid: Grid) -> FloatArray:

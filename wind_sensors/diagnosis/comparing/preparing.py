@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.comparing.counted_time import where_reference_is
+from wind_sensors.diagnosis.comparing.counted_time import where_reference_is, without_repeats
 from wind_sensors.diagnosis.comparing.observation import (
     SERIES_INTERVAL,
     Grid,
@@ -38,6 +38,9 @@ DIRECTION_TIME = 60.0
 SPEED_TIME = 10.0
 """Direction and speed are slow ones over these times [s]."""
 
+MOST_REPEATED = 0.8
+"""With more of the reference's samples repeated, too little is known of the wind."""
+
 HARDLY_TURNS = 0.4
 """Below this share of the rate that it should have, a rotor's eddies say nothing."""
 
@@ -56,6 +59,13 @@ def prepare(
         UserError: There is no reference, or too little of anything.
     """
     known = recording.station if station is None else station
+    recording, repeated = without_repeats(recording)
+    if repeated > MOST_REPEATED:
+        raise UserError(
+            f"The reference repeats the same wind in {100.0 * repeated:.0f} % of its samples.",
+            recording.name,
+            "Its heads are wet or iced, or its driver fills gaps; compare another recording.",
+        )
     drive = drive_from_recording(recording)
     seconds = (len(drive) - 1) * drive.dt
     if seconds < SHORTEST:
@@ -105,6 +115,7 @@ def prepare(
         measured=empty,
         place=place,
         memory=DriveMemory(drive),
+        repeated=repeated,
     )
     simulated, angles = comparison.signals(known)
     turning = _where_rotors_turn(comparison, simulated)

@@ -36,6 +36,9 @@ NEARLY_AS_WELL = 4.0
 """What holds throughout explains nearly as much as what begins or ends, beyond what its edges cost,
 if it brings less by no more than this."""
 
+NEARLY_AS_WELL_BESIDE = 25.0
+"""The same beside another effect, whose own form may err in a part of the record."""
+
 EXPLAINED = 0.5
 """Share of the region's score below which what is left is no more than its noise."""
 
@@ -79,7 +82,8 @@ def leader_of(
             likeliest = min(likeliest, one.evidence)
     if not enough:
         return None
-    enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough)]
+    near = _as_well(current)
+    enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough, near)]
     enough = explaining_what_stands_out(searcher, whitener, current, enough)
     most = max(brings for brings, _ in enough)
     leader = next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
@@ -148,7 +152,18 @@ def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
     return max(rivals, key=lambda rival: rival[0])[1].fit
 
 
-def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -> bool:
+def _as_well(current: Fit | None) -> float:
+    """By how much less an effect may bring that always holds, to be as good as one that passes.
+
+    Args:
+        current: The terms so far.
+    """
+    return NEARLY_AS_WELL_BESIDE if current is not None and current.terms else NEARLY_AS_WELL
+
+
+def _holds_always_as_well(
+    one: Judged, others: Sequence[tuple[float, Judged]], near: float
+) -> bool:
     """Whether an effect that passes would explain nearly as much if it always held."""
     newest = one.fit.terms[-1]
     if newest.interval == ALWAYS or newest.effect.legible:
@@ -156,7 +171,7 @@ def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]]) -
     return any(
         other.fit.terms[-1].key == newest.key
         and other.fit.terms[-1].interval == ALWAYS
-        and other.evidence < one.evidence + NEARLY_AS_WELL
+        and other.evidence < one.evidence + near
         for _, other in others
     )
 
@@ -180,7 +195,7 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
     terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
     always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
     (other,) = judged(searcher, [always], named)
-    allowed = -ONSET_GAIN if read else NEARLY_AS_WELL
+    allowed = -ONSET_GAIN if read else _as_well(named)
     as_well = is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
     return other if as_well else one
 

@@ -26,6 +26,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     evidence,
     judged,
     no_terms,
+    seen_in,
     total,
 )
 from wind_sensors.diagnosis.explaining.fitting import (
@@ -42,7 +43,7 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 MERGE_CANDIDATES = 8
 MERGE_FINALISTS = 3
-SWAP_CANDIDATES = 3
+SWAP_CANDIDATES = 5
 SWAP_GAIN = 1.0
 
 
@@ -216,6 +217,7 @@ def swapped(
     searcher: Searcher,
     whitener: Whitener,
     current: Fit,
+    known: Sequence[Term] = (),
     excluded: frozenset[str] = frozenset(),
 ) -> tuple[Fit, tuple[Alternative, ...]]:
     """The explanation with single terms exchanged for better ones, and those that come close.
@@ -224,6 +226,7 @@ def swapped(
         searcher: The search.
         whitener: The null.
         current: The explanation.
+        known: Terms that did well before, to be tried beside what the screening suggests.
         excluded: Names of effects that are not to be used.
     """
     losers: list[Judged] = []
@@ -239,21 +242,78 @@ def swapped(
         )  # fmt: skip
         candidates = [
             starts
-            for starts in searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
-            if may_join(starts[0], others)
-            and starts[0].key != current.terms[k].key
-            and starts[0].effect.name not in excluded
+            for starts in _in_place_of(searcher, whitener, without, current.terms[k], known)
+            if may_join(starts[0], others) and starts[0].effect.name not in excluded
         ]
         rivals = [
             f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)
         ]
         ranked = [r for r in judged(searcher, rivals) if plausible(r.fit)]
         losers.extend(ranked)
-        if ranked and ranked[0].evidence < leader.evidence - SWAP_GAIN:
+        better = next((r for r in ranked if _takes_over(searcher, whitener, r, leader)), None)
+        if better is not None:
             losers.append(leader)
-            leader = ranked[0]
+            leader = better
             current = leader.fit
     behind = [
-        Alternative(r.fit, r.evidence - leader.evidence) for r in losers if r is not leader
+        Alternative(r.fit, _behind(whitener, r, leader)) for r in losers if r is not leader
     ]
     return current, tuple(sorted(behind, key=lambda a: a.behind))
+
+
+def _in_common(whitener: Whitener, rival: Judged, leader: Judged) -> float:
+    """By how much an explanation is better than another in one null."""
+    return total(seen_in(whitener, leader.fit)) - total(seen_in(whitener, rival.fit))
+
+
+def _behind(whitener: Whitener, rival: Judged, leader: Judged) -> float:
+    """How far an explanation that did not take over is behind.
+
+    What is better in its own noise did not do so because it is worse in the common one.
+
+    Args:
+        whitener: The common null.
+        rival, leader: The two.
+    """
+    own = rival.evidence - leader.evidence
+    return own if own > 0.0 else max(own, -_in_common(whitener, rival, leader))
+
+
+def _takes_over(searcher: Searcher, whitener: Whitener, rival: Judged, leader: Judged) -> bool:
+    """Whether an explanation takes over: it is better in its own noise and in a common one.
+
+    In its own alone it gains from what it leaves unexplained and takes for noise. With more
+    parameters it may follow what the simulation is inexact about.
+    """
+    needed = SWAP_GAIN
+    if rival.fit.active > leader.fit.active:
+        needed = max(needed, inexact(searcher, whitener, leader.fit, rival.fit))
+    own = leader.evidence - rival.evidence
+    return min(own, _in_common(whitener, rival, leader)) > needed
+
+
+def _in_place_of(
+    searcher: Searcher, whitener: Whitener, without: Fit, term: Term, known: Sequence[Term]
+) -> list[list[Term]]:
+    """Starting points of effects that may take the place of one, on the signals that it reaches.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        without: The fit without it.
+        term: It.
+        known: Terms that did well before.
+    """
+    comparison, station = searcher.comparison, searcher.station
+    reached = set(comparison.affected(station, term.instrument))
+    suggested = searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
+    found = {starts[0].key: starts for starts in suggested}
+    for other in known:
+        starts = found.setdefault(other.key, [])
+        if all(other.interval != start.interval for start in starts):
+            starts.append(other)
+    return [
+        starts
+        for key, starts in found.items()
+        if key != term.key and reached & set(comparison.affected(station, key[1]))
+    ]

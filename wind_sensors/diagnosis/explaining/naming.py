@@ -49,8 +49,6 @@ from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
-MOST_EFFECTS = 2
-
 NARROW_SHARE = 0.85
 """Effects of single instruments win over broad ones from this share of their gain on, beyond what
 both explanations share, if they need fewer parameters."""
@@ -60,6 +58,9 @@ BROAD_PARAMETERS = 3
 
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
+LARGE_CANDIDATES = 3
+"""So many of the best single effects are tried beside another in the size that they have alone."""
+
 FINALISTS = 7
 CONTENDERS = 5
 FAR_BEHIND = 0.8
@@ -93,8 +94,9 @@ def name(
         if pair is not None:
             both = pruned(searcher, pair.whitener, pair.fit)
             if len(both.terms) > 1:
+                newest = [f.terms[0] for f in sorted(singles, key=total)[:CONTENDERS]]
                 settled = _settled(
-                    searcher, *swapped(searcher, pair.whitener, both), found.screened
+                    searcher, *swapped(searcher, pair.whitener, both, newest), found.screened
                 )
                 return replace(settled, alone=found.alone)
     broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
@@ -232,9 +234,22 @@ def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
 
 
 def _further_fits(
-    searcher: Searcher, whitener: Whitener, current: Fit, excluded: frozenset[str]
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    singles: Sequence[Fit],
+    excluded: frozenset[str],
 ) -> list[Fit]:
-    """Fits of the terms so far with one more each."""
+    """Fits of the terms so far with one more each.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        singles: Fits of single effects: of the best the size that they have alone is tried, too,
+            where a small one shows no way.
+        excluded: Names of effects that are not to be used.
+    """
     used = {t.key for t in current.terms}
 
     def eligible(starts: Sequence[Term]) -> bool:
@@ -256,7 +271,60 @@ def _further_fits(
         for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
         if eligible(starts) and not is_a_stall(searcher, current, starts[0])
     ]
+    known = {starts[0].key: starts for starts in candidates}
+    for single in sorted(singles, key=total)[:LARGE_CANDIDATES]:
+        (term,) = single.terms
+        if term.interval != ALWAYS or not eligible([term]):
+            continue
+        if term.key in known:
+            known[term.key].append(term)
+        else:
+            candidates.append([term])
     return searcher.fit_all(whitener, current, [*candidates, *windowed])
+
+
+def _one_more(
+    searcher: Searcher, whitener: Whitener, current: Fit, fits: Sequence[Fit], named: Fit | None
+) -> tuple[Judged, tuple[Alternative, ...]] | None:
+    """The best explanation with one effect more, and those that lost; None: none brings enough.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        fits: With one more each.
+        named: The terms so far; None: there are none.
+    """
+    sound = [f for f in fits if plausible(f) and not too_small(searcher, f, total(current))]
+    pool = _finalists(searcher, whitener, current, sound, named)
+    if not pool:
+        return None
+    ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
+    ranked.sort(key=not_told)
+    ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
+    ranked = [r for r in ranked if plausible(r.fit)]
+    ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
+    best = leader_of(searcher, whitener, current, ranked)
+    if best is None:
+        return None
+    leader = held_throughout(searcher, best, named)
+    losers = tuple(
+        Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not best
+    )
+    return leader, losers
+
+
+def _beside(
+    searcher: Searcher, first: Fit, singles: Sequence[Fit], excluded: frozenset[str]
+) -> tuple[Judged, tuple[Alternative, ...]] | None:
+    """The best effect beside those so far; None: none brings enough.
+
+    What is left is judged as what the named effects, in another form, do not explain.
+    """
+    whitener = searcher.whitener(first.simulated, first)
+    current = seen_in(whitener, first)
+    fits = _further_fits(searcher, whitener, current, singles, excluded)
+    return _one_more(searcher, whitener, current, fits, first)
 
 
 def _greedy(
@@ -266,7 +334,7 @@ def _greedy(
     singles: Sequence[Fit],
     excluded: frozenset[str],
 ) -> Naming:
-    """Add the best effect, judge the noise again, and so on while it pays.
+    """Take the best effect, judge the noise again, and look for one beside it.
 
     Args:
         searcher: The search.
@@ -275,64 +343,64 @@ def _greedy(
         singles: Fits of single effects in it.
         excluded: Names of effects that are not to be used.
     """
+    report = progress or (lambda share: None)
     current = no_terms(whitener, searcher)
     screened = tuple(
         (s.effect, s.instrument, s.gain)
         for s in searcher.scores(whitener, current.vector)[:12]
     )
-    alternatives: tuple[Alternative, ...] = ()
-    alone = Alone((), ())
-    for turn in range(MOST_EFFECTS):
-        first = turn == 0
-        named = None if first else current
-        if named is not None:
-            # What is left is judged as what the named effects, in another form, do not explain.
-            whitener = searcher.whitener(named.simulated, named)
-            current = seen_in(whitener, current)
-        if first:
-            fits = [f for f in singles if f.terms[0].effect.name not in excluded]
-        else:
-            fits = _further_fits(searcher, whitener, current, excluded)
-        if progress:
-            progress((turn + 0.6) / MOST_EFFECTS)
-        sound = [f for f in fits if plausible(f) and not too_small(searcher, f, total(current))]
-        pool = _finalists(searcher, whitener, current, sound, named)
-        if not pool:
-            break
-        ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
-        ranked.sort(key=not_told)
-        ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
-        ranked = [r for r in ranked if plausible(r.fit)]
-        ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
-        leader = leader_of(searcher, whitener, current, ranked)
-        if leader is None:
-            break
-        leader = held_throughout(searcher, leader, named)
-        current = leader.fit
-        losers = tuple(
-            Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not leader
-        )
-        if first:
-            alone = Alone(current.terms, losers)
-        alternatives = (*alternatives, *losers) if not first else losers
+    report(0.3)
+    allowed = [f for f in singles if f.terms[0].effect.name not in excluded]
+    first = _one_more(searcher, whitener, current, allowed, None)
+    if first is None:
+        report(1.0)
+        return _settled(searcher, current, (), screened)
+    leader, losers = first
+    alone = Alone(leader.fit.terms, losers)
+    report(0.5)
+    current, alternatives = _with_another(searcher, leader.fit, losers, singles, excluded)
+    report(0.8)
+    if len(current.terms) == 1 and current.terms[0].key != leader.fit.terms[0].key:
+        # What took the place of two may stand beside another one itself.
+        current, alternatives = _with_another(searcher, current, alternatives, singles, excluded)
+    report(1.0)
+    return replace(_settled(searcher, current, alternatives, screened), alone=alone)
+
+
+def _with_another(
+    searcher: Searcher,
+    first: Fit,
+    losers: tuple[Alternative, ...],
+    singles: Sequence[Fit],
+    excluded: frozenset[str],
+) -> tuple[Fit, tuple[Alternative, ...]]:
+    """An effect with the best one beside it, if the two hold together, and what comes close.
+
+    Args:
+        searcher: The search.
+        first: The effect.
+        losers: Single effects that lost against it.
+        singles: Fits of single effects.
+        excluded: Names of effects that are not to be used.
+    """
+    second = _beside(searcher, first, singles, excluded)
+    current = first if second is None else second[0].fit
     whitener = searcher.whitener(current.simulated)
-    if current.terms:
-        current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
-    else:
-        current = seen_in(whitener, current)
-    if len(current.terms) > 1:
-        known = [alone.terms, *((term,) for a in alternatives for term in a.fit.terms)]
-        current = pruned(searcher, whitener, current)
-        current = merged(searcher, whitener, current, known, excluded)
-        if len(current.terms) > 1:
-            current, alternatives = swapped(searcher, whitener, current, excluded)
-        else:
-            alternatives = tuple(a for a in alternatives if len(a.fit.terms) == 1)
-            current = leading_alone(searcher, current, alone.terms)
-    if progress:
-        progress(1.0)
-    settled = _settled(searcher, current, alternatives, screened)
-    return replace(settled, alone=alone if alone.terms else None)
+    current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
+    if second is None:
+        return current, losers
+    newest = [term for a in (*second[1], *losers) for term in a.fit.terms[-1:]]
+    pair = pruned(searcher, whitener, current)
+    current = merged(
+        searcher, whitener, pair, [first.terms, *((term,) for term in newest)], excluded
+    )
+    if len(current.terms) == 1:
+        single = leading_alone(searcher, current, first.terms)
+        if len(pair.terms) == 1 or single.terms[0].key == current.terms[0].key:
+            return single, tuple(a for a in losers if len(a.fit.terms) == 1)
+        # What would replace both does less than the first does alone.
+        current = pair
+    return swapped(searcher, whitener, current, newest, excluded)
 
 
 def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:

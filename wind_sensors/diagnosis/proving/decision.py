@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,7 +18,7 @@ from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.regions import Region, RegionBank
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Propeller, Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -120,12 +120,14 @@ def remainder_of(
 ) -> Remainder:
     """What is left in the channels that the named effects reach.
 
-    What another instrument shows beside them says nothing against the names, nor does what a
-    healthy day shows as loudly, nor the power of eddies if they bring some of their own.
+    What another instrument shows beside them says nothing against the names, unless it carries the
+    one that they change (a vane off the wind takes its propeller along), nor does what a healthy
+    day shows as loudly, nor the power of eddies if they bring some of their own.
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
-        channels = _changed(naming)
+        changed = _changed(naming)
+        channels = changed | _carriers(comparison, changed)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
         counts = [
             r.channel in channels and not (stirred and r.kind in STIRRED_KINDS)
@@ -146,6 +148,17 @@ def _changed(naming: Naming) -> set[str]:
     squares = np.bincount(comparison.channel_of_each, change**2)
     least = min(CHANGED, CHANGED_SHARE * float(squares.sum()))
     return {c.name for c, moved in zip(comparison.channels, squares, strict=True) if moved > least}
+
+
+def _carriers(comparison: Comparison, channels: Collection[str]) -> set[str]:
+    """Channels of the vanes that carry the propellers of some channels."""
+    carried = [
+        comparison.station.instrument(c.instrument)
+        for c in comparison.channels
+        if c.name in channels
+    ]
+    vanes = {i.mounted_on for i in carried if isinstance(i, Propeller)}
+    return {c.name for c in comparison.channels if c.instrument in vanes}
 
 
 def _is_outside(region: Region, naming: Naming) -> bool:

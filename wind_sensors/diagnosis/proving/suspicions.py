@@ -11,7 +11,7 @@ import numpy as np
 from wind_sensors.diagnosis.effects.definition import entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import Fit, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit, planted
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -102,7 +102,11 @@ def suspicion_of(
     for cost, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
         if math.isinf(cost):
             continue
-        key = (start.term.key if start.term is not None else None, start.fault.key)
+        key = (
+            start.term.key if start.term is not None else None,
+            start.fault.key,
+            start.fault.interval,
+        )
         cheapest.setdefault(key, []).append(start)
     chosen = [start for group in cheapest.values() for start in group[:STARTS]]
     found = in_parallel(fitted, chosen, workers)
@@ -111,10 +115,15 @@ def suspicion_of(
 
 
 def _in_place_of(term: Term, station: Station) -> list[Trial]:
-    """Suspected faults that can be mistaken for a term, in all their templates."""
+    """Suspected faults that can be mistaken for a term, in all their templates.
+
+    What seems to begin or end inside the record may be one that always holds: a vane comes to the
+    heading at which it catches when the wind has turned.
+    """
     return [
-        Trial(term, Term(fault, term.instrument, dict(values), term.interval))
+        Trial(term, Term(fault, term.instrument, dict(values), interval))
         for fault in SUSPECTS
+        for interval in dict.fromkeys((term.interval, ALWAYS))
         if term.effect.name in fault.confusable
         and any(
             fault.applies(entry_of(station, entry), station)

@@ -1,0 +1,57 @@
+"""A reference that fills gaps with its last wind: what it repeats is no wind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnosis_naming import STATION, baseline, recorded
+
+from wind_sensors.diagnosis.comparing.counted_time import without_repeats
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.errors import UserError
+from wind_sensors.station.signals import Recording
+
+
+def holding(recording: Recording, every: float, held: float) -> Recording:
+    """The recording with a reference that repeats its wind for so long [s], every so often [s]."""
+    assert recording.reference is not None
+    time, velocity = recording.reference.time, recording.reference.velocity
+    seconds = (time - time[0]) * 1e-9
+    last = np.where(seconds % every < held, 0, np.arange(time.size))
+    last = np.maximum.accumulate(last)
+    return replace(recording, reference=replace(recording.reference, velocity=velocity[last]))
+
+
+def test_what_is_repeated_for_long_is_left_out_and_the_first_of_it_stays() -> None:
+    recording = holding(recorded(STATION, 61), 20.0, 4.0)
+    found, share = without_repeats(recording)
+    assert found.reference is not None and recording.reference is not None
+    silent = ~np.isfinite(found.reference.velocity).all(axis=1)
+    seconds = (recording.reference.time - recording.reference.time[0]) * 1e-9
+    held = (seconds % 20.0 < 4.0) & (seconds > 1.0)
+    np.testing.assert_array_equal(silent[seconds > 4.0], held[seconds > 4.0])
+    assert share == pytest.approx(np.mean(held), abs=0.01)
+
+
+def test_short_repeats_and_a_tunnels_wind_stay() -> None:
+    short = holding(recorded(STATION, 61), 20.0, 0.8)
+    assert without_repeats(short) == (short, 0.0)
+    assert STATION.reference is not None
+    tunnel = STATION.reference.model_copy(update={"kind": "tunnel"})
+    long = holding(recorded(STATION, 61), 20.0, 4.0)
+    long = replace(long, station=STATION.model_copy(update={"reference": tunnel}))
+    assert without_repeats(long) == (long, 0.0)
+
+
+def test_a_healthy_station_with_such_a_reference_is_told_of_it_and_nothing_is_named() -> None:
+    found = diagnose(holding(recorded(STATION, 61), 20.0, 4.0), baseline(), with_proof=False)
+    assert found.verdict == "unknown" and not found.findings
+    assert "repeats its last wind in 20 %" in found.unexplained.description
+
+
+def test_a_reference_that_hardly_ever_changes_is_refused() -> None:
+    with pytest.raises(UserError, match="repeats the same wind"):
+        prepare(holding(recorded(STATION, 61), 20.0, 18.0))

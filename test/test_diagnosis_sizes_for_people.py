@@ -1,0 +1,76 @@
+"""Sizes as people read them: bearings of the compass or of the bow, days, units."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from test_diagnosis_naming import STATION
+
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.report.sizes import sizes_of
+from wind_sensors.station.model import Platform, Station
+
+
+def finding(effect: str, **parameters: Estimate) -> Finding:
+    values = {name: estimate.value for name, estimate in parameters.items()}
+    term = Term(catalogue()[effect], "cup", values)
+    place = Found(Region("cup/rotor_rate", "all", 0.0, 900.0, "everywhere"), 9.0, 0.1, "m/s")
+    return Finding(term, parameters, place, 1.0, 0.001, (), None)
+
+
+ON_A_BOAT = Station.model_validate(
+    {
+        **STATION.model_dump(exclude_none=True),
+        "platform": Platform.model_validate({"odometry": {"topic": "/odom"}}).model_dump(
+            exclude_none=True
+        ),
+    }
+)
+
+
+@given(st.floats(-700.0, 700.0), st.floats(0.5, 20.0))
+def test_a_bearing_points_where_its_vector_points(heading: float, half: float) -> None:
+    bearing = Estimate(heading, heading - half, heading + half, "deg")
+    (size,) = sizes_of(finding("wake_shadow", bearing_from=bearing), STATION)
+    assert size.unit == "deg from north"
+    east, north = np.cos(np.radians(heading)), np.sin(np.radians(heading))
+    told = np.radians(float(size.value))
+    # Told to the degree.
+    assert np.hypot(np.sin(told) - east, np.cos(told) - north) < np.radians(0.51)
+    wide = (float(size.high) - float(size.low)) % 360.0
+    assert wide == pytest.approx(2.0 * half, abs=1.01)
+
+
+def test_on_a_platform_bearings_count_from_the_bow_to_starboard() -> None:
+    # The instrument's x axis points forward, its y axis to port.
+    port = Estimate(90.0, 80.0, 95.0, "deg")
+    (size,) = sizes_of(finding("wake_shadow", bearing_from=port), ON_A_BOAT)
+    assert size.text == "wind from 270 deg from the bow (265 to 280)"
+
+
+def test_a_turned_sensor_does_not_turn_the_bow() -> None:
+    assert ON_A_BOAT.platform is not None
+    turned = ON_A_BOAT.platform.model_copy(update={"sensor_rotation_deg": (0.0, 0.0, 90.0)})
+    boat = ON_A_BOAT.model_copy(update={"platform": turned})
+    ahead = Estimate(-90.0, -95.0, -85.0, "deg")
+    (size,) = sizes_of(finding("wake_shadow", bearing_from=ahead), boat)
+    assert size.value == "0"
+
+
+def test_long_times_are_days_and_short_ones_seconds() -> None:
+    day = 86400.0
+    long = finding("stuck_sensor", start=Estimate(10.5 * day, 10.5 * day, 10.51 * day, "s"))
+    short = finding("stuck_sensor", start=Estimate(405.0, 404.0, 405.0, "s"))
+    assert sizes_of(long, STATION)[0].value == "10.50"
+    assert sizes_of(long, STATION)[0].unit.startswith("days")
+    assert sizes_of(short, STATION)[0].text == "start 405 s (404 to 405)"
+
+
+def test_what_has_no_interval_shows_none() -> None:
+    unknown = finding("calibration_drift", gain=Estimate(0.93, float("nan"), float("nan"), "1"))
+    assert sizes_of(unknown, STATION)[0].text == "gain 0.93"

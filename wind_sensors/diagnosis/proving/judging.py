@@ -1,0 +1,246 @@
+"""What is to be said of an explanation: verdict, findings, and what speaks against them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.explaining.detectable import smallest_detectable
+from wind_sensors.diagnosis.explaining.explanation import Naming
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.calibrated_range import (
+    is_too_calm,
+    need_calibration,
+    too_calm,
+)
+from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess_of
+from wind_sensors.diagnosis.proving.contradictions import (
+    is_discordant,
+    is_uneven,
+    undo_each_other,
+    varies,
+)
+from wind_sensors.diagnosis.proving.decision import (
+    REMAINDER_P,
+    Remainder,
+    Verdict,
+    is_noisy,
+    located,
+    remainder_of,
+    unstirred,
+    verdict_of,
+    with_own_noise,
+)
+from wind_sensors.diagnosis.proving.findings import (
+    Finding,
+    equal_explanations,
+    findings_of,
+)
+from wind_sensors.diagnosis.proving.support import (
+    borne_out,
+    determined,
+    made_up,
+    passes_unseen,
+    stands_out,
+)
+from wind_sensors.diagnosis.proving.suspicions import suspicion_of
+from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
+from wind_sensors.station.model import Station
+
+REPEATED = 0.01
+"""With more of the reference's samples repeating those before them, something is wrong with it."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """An explanation and what is to be said of it.
+
+    Attributes:
+        naming: The explanation.
+        verdict, findings, objection: What is said, and what speaks against it.
+        remainder: What it leaves in the region where it leaves most.
+        excess: Noise over that of healthy days.
+        calm: Whether nobody knows what is normal in such a wind.
+        detectable: Smallest detectable sizes: value, unit, in units of the smallest of interest.
+        bank: Regions.
+        regions_before: The strongest of them without any effect.
+        regions: What is left, for people.
+    """
+
+    naming: Naming
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+    objection: str
+    remainder: Remainder
+    excess: Excess
+    calm: bool
+    detectable: Mapping[str, tuple[float, str, float]]
+    bank: RegionBank
+    regions_before: tuple[Found, ...]
+    regions: tuple[Found, ...]
+
+    @property
+    def is_claim(self) -> bool:
+        """Whether something is named."""
+        return self.verdict in {"named", "ambiguous"}
+
+    def words(self, baseline: Baseline) -> str:
+        """What is left, and why no name is given, for people.
+
+        Args:
+            baseline: What is normal.
+        """
+        description = ""
+        repeated = self.naming.whitener.comparison.repeated
+        if (self.verdict == "unknown" and repeated <= REPEATED) or self.remainder.p < REMAINDER_P:
+            description = _description(self.regions[0])
+        if self.verdict == "unknown" and is_noisy(self.naming, self.excess):
+            description = f"{description}; {described(self.excess)}"
+        if self.calm and self.verdict == "inconclusive":
+            description = too_calm(baseline)
+        said = [description, self.objection]
+        if repeated > REPEATED:
+            said.append(
+                f"the reference repeats its last wind in {100.0 * repeated:.0f} % of its samples, "
+                "which were left out: look at its heads and its driver"
+            )
+        return "; ".join(part for part in said if part)
+
+
+def judgement_of(
+    searcher: Searcher,
+    naming: Naming,
+    baseline: Baseline,
+    workers: int,
+    report: Callable[[str], Callable[[float], None]],
+    with_proof: bool,
+) -> Judgement:
+    """What is to be said of an explanation.
+
+    Args:
+        searcher: The search that found it.
+        naming: The explanation.
+        baseline: What is normal.
+        workers: Processes.
+        report: Gives a phase's progress function.
+        with_proof: Fit and score held-out blocks.
+    """
+    comparison = searcher.comparison
+    whitener = naming.whitener
+    bank = region_bank(whitener, searcher.bank.without)
+    report("locating")(0.5)
+    before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
+    rest = region_bank(naming.adequate, searcher.bank.without)
+    left = naming.adequate.of(naming.fit.simulated)
+    after = strongest(naming.adequate, rest, left, naming.fit.simulated)
+    remainder = remainder_of(naming, rest, comparison, baseline)
+    detectable = smallest_detectable(searcher, whitener)
+    equal = equal_explanations(naming)
+    located_p = bank.p_value(max(f.score for f in before))
+    excess = _noise_left(naming, baseline)
+    verdict = verdict_of(naming, equal, remainder, detectable, located_p, excess)
+    calm = is_too_calm(comparison, baseline)
+    if calm and verdict != "none" and need_calibration(naming.fit.terms):
+        verdict = "inconclusive"
+    report("proving")(0.2)
+    findings = findings_of(naming, equal, before, bank, baseline, with_proof) if verdict in {
+        "named", "ambiguous"
+    } else ()  # fmt: skip
+    report("proving")(1.0)
+    structured = located(naming, bank, comparison, baseline).is_structure
+    verdict, findings, objection = _upheld(
+        verdict, findings, naming, comparison, baseline.station, structured, workers
+    )
+    if verdict == "none" and comparison.repeated > REPEATED:
+        # The instruments are well, but the recording is not.
+        verdict = "unknown"
+    if calm and verdict == "unknown":
+        verdict = "inconclusive"
+    if verdict == "unknown" and not objection:
+        suspicion = suspicion_of(naming, baseline.station, workers, beside=True)
+        objection = suspicion.words if suspicion is not None else ""
+    return Judgement(
+        naming=naming,
+        verdict=verdict,
+        findings=findings,
+        objection=objection,
+        remainder=remainder,
+        excess=excess,
+        calm=calm,
+        detectable=detectable,
+        bank=bank,
+        regions_before=tuple(before),
+        regions=tuple(_structured(before) if verdict == "unknown" else after),
+    )
+
+
+def _noise_left(naming: Naming, baseline: Baseline) -> Excess:
+    """How far the residual's noise exceeds that of healthy days, where that can be judged."""
+    apart = unstirred(naming, baseline.station)
+    if apart is None:
+        return Excess()
+    simulated = apart.simulate(planted(baseline.station, naming.fit.terms))
+    return excess_of(apart, simulated, baseline, with_own_noise(naming))
+
+
+def _upheld(
+    verdict: Verdict,
+    findings: tuple[Finding, ...],
+    naming: Naming,
+    comparison: Comparison,
+    station: Station,
+    structured: bool,
+    workers: int,
+) -> tuple[Verdict, tuple[Finding, ...], str]:
+    """Verdict and findings after what speaks against them, and what does, for people.
+
+    What was only said of a part of the record, and is withdrawn, leaves nothing if the recording
+    shows no more than healthy ones do: of the many intervals some fit the swings of a healthy vane.
+    """
+    if not findings:
+        return verdict, (), ""
+    names = " and ".join(t.effect.name for t in naming.fit.terms)
+    passing = any(t.interval != ALWAYS for t in naming.fit.terms)
+    left: Verdict = "unknown" if structured or not passing else "none"
+    if not borne_out(findings):
+        left = left if stands_out(findings) else "none"
+        objection = "blocks that were not fitted do not bear it out"
+    elif passes_unseen(findings):
+        left = left if stands_out(findings) else "none"
+        objection = "only for a part of the record, where nothing stands out"
+    elif made_up(findings, comparison, naming.gain):
+        objection = "the data do not show the one without the other"
+    elif undo_each_other(naming, station):
+        objection = "each would have to undo what the other does"
+    elif varies(naming, station):
+        objection = "with another size in parts of the record"
+    elif is_uneven(naming, station):
+        objection = "with another size in lively minutes than in quiet ones"
+    elif is_discordant(naming, station):
+        objection = "with another size on one signal than on another"
+    elif not determined(findings):
+        objection = "of any size, nought among them"
+    elif (suspicion := suspicion_of(naming, station, workers)) is not None:
+        left, objection = "unknown", suspicion.words
+    else:
+        return verdict, findings, ""
+    return left, (), f"{names} would fit, but {objection}"
+
+
+def _structured(found: list[Found]) -> list[Found]:
+    """Regions of time, speed and direction before those of spectra and statistics."""
+    return sorted(found, key=lambda f: f.region.kind in OF_POWER)
+
+
+def _description(found: Found) -> str:
+    channel = found.region.channel
+    if found.region.kind in OF_POWER:
+        return f"{channel}: {found.region.label} differs from the simulation"
+    sign = "above" if found.excess > 0.0 else "below"
+    return (
+        f"{channel}: measured {abs(found.excess):.2g} {found.unit} {sign} the simulation, "
+        f"{found.region.label}"
+    )

@@ -1,0 +1,78 @@
+"""Sizes of effects for people: with units, bearings from north or the bow, long times in days."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.station.model import Station
+
+DAY = 86400.0
+
+LONG = 3.0 * DAY
+"""Times from here on [s] are told in days."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """One parameter as it is printed: name, value, ends of its interval, unit."""
+
+    name: str
+    value: str
+    low: str
+    high: str
+    unit: str
+
+    @property
+    def text(self) -> str:
+        """In one line."""
+        unit = f" {self.unit}" if self.unit else ""
+        interval = f" ({self.low} to {self.high})" if self.low else ""
+        return f"{self.name} {self.value}{unit}{interval}"
+
+
+def words(effect: str) -> str:
+    """An identifier for people."""
+    return effect.replace("_", " ")
+
+
+def number_text(value: float) -> str:
+    """Three digits."""
+    return f"{value:.3g}" if np.isfinite(value) else "?"
+
+
+def sizes_of(finding: Finding, station: Station) -> list[Size]:
+    """Parameters of a finding as they are printed.
+
+    Args:
+        finding: The finding.
+        station: Tells whether headings count from north or from the bow.
+    """
+    return [_size(name, e, station) for name, e in finding.parameters.items()]
+
+
+def _size(name: str, e: Estimate, station: Station) -> Size:
+    if name == "bearing_from":
+        return _bearing(e, station)
+    known = np.isfinite(e.low)
+    if e.unit == "s" and abs(e.value) > LONG:
+        ends = (f"{e.low / DAY:.2f}", f"{e.high / DAY:.2f}") if known else ("", "")
+        return Size(words(name), f"{e.value / DAY:.2f}", *ends, "days after the first mean")
+    ends = (number_text(e.low), number_text(e.high)) if known else ("", "")
+    return Size(words(name), number_text(e.value), *ends, "" if e.unit == "1" else e.unit)
+
+
+def _bearing(e: Estimate, station: Station) -> Size:
+    """A bearing clockwise, as winds are told; files count counter-clockwise from the x axis."""
+    on_mast = station.platform is None
+    start = 90.0 if station.platform is None else -station.platform.sensor_rotation_deg[2]
+
+    def clockwise(value: float) -> str:
+        return f"{(start - value) % 360.0:.0f}" if np.isfinite(value) else ""
+
+    return Size(
+        "wind from", clockwise(e.value), clockwise(e.high), clockwise(e.low),
+        "deg from north" if on_mast else "deg from the bow",
+    )  # fmt: skip
