@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.fitting import Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.moves import simplified
+from wind_sensors.diagnosis.explaining.moves import simplified, swapped
 from wind_sensors.diagnosis.explaining.pairs import built_on_simple, promise
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
@@ -136,3 +136,26 @@ def test_a_flow_is_as_distorted_as_where_it_changes_most() -> None:
     assert catalogue()["flow_distortion"].relative_size(flow) == pytest.approx(0.06 / 0.02)
     opposed = {**flow, "cosine_1": 0.0}
     assert catalogue()["flow_distortion"].relative_size(opposed) == pytest.approx(0.03 / 0.02)
+
+
+def test_an_effect_of_a_pair_is_exchanged_for_what_competed_before() -> None:
+    # An offset of the rotor's reading beside a late vane: a gain of the calibration does nearly the
+    # same in such a wind, whatever the screening of what is left suggests.
+    effects = catalogue()
+    late = Term(effects["timestamp_latency"], "vane", {"latency": 0.8})
+    terms = [late, Term(effects["calibration_offset"], "cup", {"offset": -0.4})]
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, terms), 74)), baseline(), effects, {}
+    )
+    gain = Term(effects["calibration_drift"], "cup", {"gain": 0.95})
+    null = searcher.whitener(searcher.bank.without)
+    wrong = fit(null, STATION, [late, gain], searcher.bank.without)
+    null = searcher.whitener(wrong.simulated)
+    wrong = fit(null, STATION, wrong.terms, searcher.bank.without)
+    right, losers = swapped(searcher, null, wrong, [terms[1]])
+    assert {t.effect.name for t in right.terms} == {"timestamp_latency", "calibration_offset"}
+    beside = {t.effect.name for a in losers for t in a.fit.terms if t.instrument == "cup"}
+    assert "calibration_drift" in beside
+    # Nothing of the rotor takes the vane's place, or the other way round.
+    for loser in losers:
+        assert {t.instrument for t in loser.fit.terms} & {"vane", "station"}

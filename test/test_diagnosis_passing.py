@@ -18,7 +18,7 @@ from wind_sensors.diagnosis.explaining.explanation import Alternative, Judged, N
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
 from wind_sensors.diagnosis.explaining.moves import merged
-from wind_sensors.diagnosis.explaining.naming import blind_starts, name, named_alone
+from wind_sensors.diagnosis.explaining.naming import blind_starts, first_round, name, named_alone
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORE, remainder_of, unstirred
 from wind_sensors.diagnosis.proving.findings import equal_explanations
@@ -254,7 +254,7 @@ def test_a_pair_can_be_judged_by_the_effect_that_led() -> None:
     slow = with_effect(STATION, catalogue()["rotor_inertia"], "cup", {"inertia_factor": 2.5})
     both = with_effect(slow, catalogue()["vane_offset"], "vane", {"offset": 6.0})
     searcher = searcher_of(prepare(recorded(both, 93)), baseline(), catalogue(), {})
-    pair = name(searcher)
+    pair = name(searcher, first_round(searcher))
     assert {t.effect.name for t in pair.fit.terms} == {"rotor_inertia", "vane_offset"}
     alone = named_alone(searcher, pair)
     assert alone is not None and pair.alone is not None

@@ -11,6 +11,7 @@ from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_keys
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit
 from wind_sensors.diagnosis.proving.suspicions import suspicion_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Angles, Recording
@@ -45,6 +46,22 @@ def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings() 
     found = diagnose(recorded(with_keys(STATION, "vane", caught), 67), baseline())
     assert found.verdict == "unknown"
     assert "catches at one heading" in found.unexplained.description
+
+
+def test_a_bearing_that_catches_all_the_time_is_no_friction_that_begins() -> None:
+    # Where the wind turns late, the vane comes late to the heading at which it catches.
+    seen = recorded(STATION, 67).angles["vane"].angle
+    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen)))))
+    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": 8.0}
+    naming = diagnose(
+        recorded(with_keys(STATION, "vane", caught), 67), baseline(), with_proof=False
+    ).naming
+    begun = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}, (200.0, None))
+    fitted = fit(naming.whitener, STATION, [begun])
+    suspicion = suspicion_of(replace(naming, fit=fitted), STATION)
+    assert suspicion is not None
+    assert suspicion.fault.key == ("catch", "vane")
+    assert suspicion.fault.interval == ALWAYS
 
 
 def test_friction_keeps_its_name_beside_them() -> None:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import planted
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.naming import name, named_alone
+from wind_sensors.diagnosis.explaining.naming import first_round, name, named_alone
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
@@ -27,6 +29,10 @@ from wind_sensors.station.signals import Recording
 TURNING_MISFIT = 0.1
 """The search runs again without the seconds in which vanes turn round apart if these hold this
 share of a vane's misfit."""
+
+OTHER_SPEED = 0.1
+"""It runs again, too, with the wind at the sensors that a named motion of the platform gives, if
+that differs by this share: by the old one eddies have the wrong sizes."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +76,69 @@ def _explained(
     workers: int,
     report: Callable[[str], Callable[[float], None]],
 ) -> tuple[Searcher, Naming]:
-    """The explanation of a recording, and the search that found it."""
+    """The explanation of a recording, and the search that found it.
+
+    Where it holds a motion of the platform that makes another wind at the sensors, it is the
+    explanation of the recording seen in that wind.
+    """
+    searcher = _searcher(comparison, baseline, effects, workers, report)
+    first = first_round(searcher)
+
+    def seen_moving(terms: Sequence[Term]) -> tuple[Searcher, Naming] | None:
+        moved = _moving(comparison, terms)
+        if moved is None:
+            return None
+        again = _searcher(moved, baseline, effects, workers, report)
+        naming = name(again, first_round(again), report("fitting effects"))
+        return (again, naming) if _motion(naming.fit.terms) else None
+
+    found = seen_moving(first.terms)
+    if found is not None:
+        return found
+    naming = name(searcher, first, report("fitting effects"))
+    if _motion(naming.fit.terms) != _motion(first.terms):
+        found = seen_moving(naming.fit.terms)
+    return found or (searcher, naming)
+
+
+def _searcher(
+    comparison: Comparison,
+    baseline: Baseline,
+    effects: Mapping[str, Effect],
+    workers: int,
+    report: Callable[[str], Callable[[float], None]],
+) -> Searcher:
     guesses = {
         key: terms
         for key, terms in guesses_of(comparison, baseline.station).items()
         if key[0] in effects
     }
-    searcher = searcher_of(
+    return searcher_of(
         comparison, baseline, effects, guesses, workers, report("simulating the catalogue")
     )
-    return searcher, name(searcher, report("fitting effects"))
+
+
+def _motion(terms: Sequence[Term]) -> list[Term]:
+    return [term for term in terms if term.instrument == PLATFORM]
+
+
+def _moving(comparison: Comparison, terms: Sequence[Term]) -> Comparison | None:
+    """The comparison with eddies measured by the wind that a wrong motion of the platform hid.
+
+    Args:
+        comparison: The recording.
+        terms: What explains it.
+
+    Returns:
+        None: no motion is among it, or it makes no such difference.
+    """
+    motion = _motion(terms)
+    if not motion:
+        return None
+    station = comparison.station
+    moved = prepare(comparison.recording, station, comparison.place, planted(station, motion))
+    change = np.abs(moved.speed - comparison.speed)
+    return moved if np.mean(change) > OTHER_SPEED * np.mean(comparison.speed) else None
 
 
 def diagnose(
@@ -113,6 +172,7 @@ def diagnose(
     if is_calm(comparison):
         baseline = baseline.in_calm()
     searcher, naming = _explained(comparison, baseline, known, workers, report)
+    comparison = searcher.comparison
     if naming.fit.terms:
         rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
         follows = comparison.where_vanes_follow(rivals)

@@ -46,7 +46,10 @@ HARDLY_TURNS = 0.4
 
 
 def prepare(
-    recording: Recording, station: Station | None = None, place: Place | None = None
+    recording: Recording,
+    station: Station | None = None,
+    place: Place | None = None,
+    moving: Station | None = None,
 ) -> Comparison:
     """Prepare a recording for comparison.
 
@@ -54,11 +57,14 @@ def prepare(
         recording: With a reference wind.
         station: Station to compare with; None: the recording's own.
         place: Where the reference stands; None: unknown, its wind counts as that at the sensors.
+        moving: The same station, moving as it is believed to: it tells the slow speed and direction
+            of the wind at the sensors, by which eddies are measured; None: `station` does.
 
     Raises:
         UserError: There is no reference, or too little of anything.
     """
     known = recording.station if station is None else station
+    believed = known if moving is None else moving
     recording, repeated = without_repeats(recording)
     if repeated > MOST_REPEATED:
         raise UserError(
@@ -87,10 +93,10 @@ def prepare(
             "Check the topics in the station file with `wind info`.",
         )
     first = known.instrument(channels[0].instrument)
-    flow = WindAtSensors(known, drive).flow(first).wind
+    flow = WindAtSensors(believed, drive).flow(first).wind
     if place is not None:
         drive = delayed(drive, flow, place)
-        flow = WindAtSensors(known, drive).flow(first).wind
+        flow = WindAtSensors(believed, drive).flow(first).wind
     at = np.arange(len(drive)) * drive.dt
     coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
     speed = np.hypot(flow[:, 0], flow[:, 1])
@@ -117,7 +123,7 @@ def prepare(
         memory=DriveMemory(drive),
         repeated=repeated,
     )
-    simulated, angles = comparison.signals(known)
+    simulated, angles = comparison.signals(believed)
     turning = _where_rotors_turn(comparison, simulated)
     comparison = replace(
         comparison,

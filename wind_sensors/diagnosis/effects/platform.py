@@ -130,7 +130,11 @@ PLATFORM_VELOCITY_SCALE = Effect(
     source="rigid-body kinematics",
     region="with the carrier's speed and heading",
     parameters=(
-        Parameter("velocity_scale", "1", 0.4, 2.5, healthy=1.0, minimum=0.05, step=0.01),
+        # Knots or km/h for m/s, or the other way round, are errors of 0.28 to 3.6.
+        Parameter(
+            "velocity_scale", "1", 0.1, 6.0, healthy=1.0, minimum=0.05, step=0.01,
+            starts=(0.4, 0.7, 1.5, 2.5),
+        ),
     ),
     applies=_is_platform,
     update=_velocity_scale,

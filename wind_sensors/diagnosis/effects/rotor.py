@@ -35,7 +35,8 @@ CALIBRATION_DRIFT = Effect(
     equation="l S = gain * U - U0",
     source="K14, eq. (58)",
     region="all speeds, in proportion",
-    parameters=(Parameter("gain", "1", 0.4, 2.0, healthy=1.0, minimum=0.01, step=0.004),),
+    # Another number of pulses a turn, or knots for m/s, are errors of 0.25 to 4.
+    parameters=(Parameter("gain", "1", 0.15, 6.0, healthy=1.0, minimum=0.01, step=0.004),),
     applies=_is_rotor,
     update=_gain,
     exact=True,

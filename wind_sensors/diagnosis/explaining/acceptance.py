@@ -9,7 +9,12 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explaining.bounds import run_away
-from wind_sensors.diagnosis.explaining.explanation import Judged, no_terms, total
+from wind_sensors.diagnosis.explaining.explanation import (
+    CLEARLY_BETTER,
+    Judged,
+    no_terms,
+    total,
+)
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
 from wind_sensors.diagnosis.explaining.ruled_out import reads_in_its_gap
@@ -306,6 +311,15 @@ def may_join(further: Term, terms: Sequence[Term]) -> bool:
         )
         for term in terms
     )
+
+
+def owed(term: Term, other: Term) -> float:
+    """What a term must bring more than another one that it contains; nought if it does not.
+
+    A damaged cup that pulls as the others do is a rotor of another calibration.
+    """
+    contains = term.instrument == other.instrument and other.effect.name in term.effect.contains
+    return CLEARLY_BETTER if contains else 0.0
 
 
 def plausible(candidate: Fit) -> bool:

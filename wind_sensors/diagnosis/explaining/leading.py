@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     inexactness,
     is_plausible,
     needed_gain,
+    owed,
     passing_gain,
 )
 from wind_sensors.diagnosis.explaining.explanation import (
@@ -53,7 +54,7 @@ def leader_of(
 
     What the signals tell by themselves comes first. Of the others only those compete that are not
     clearly behind in likelihood; of those that bring the same the likeliest leads. One that is both
-    simpler and likelier leads in any case.
+    simpler and likelier leads in any case; than what contains it, it may be a little less likely.
 
     Args:
         searcher: The search.
@@ -90,7 +91,8 @@ def leader_of(
     simpler = [
         one
         for _, one in enough
-        if one.evidence < leader.evidence and one.fit.active < leader.fit.active
+        if one.fit.active < leader.fit.active
+        and one.evidence < leader.evidence + owed(leader.fit.terms[-1], one.fit.terms[-1])
     ]
     return min(simpler, key=lambda one: one.evidence, default=leader)
 

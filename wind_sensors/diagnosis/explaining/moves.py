@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     large_enough,
     may_join,
     needed_gain,
+    owed,
     plausible,
     times_beside,
     too_small,
@@ -202,11 +203,13 @@ def merged(
     if not ranked:
         return current
     alone = ranked[0]
-    margin = inexact(searcher, whitener, alone.fit, current)
     further = [t for t in current.terms if t.key != alone.fit.terms[0].key]
     if len(further) == len(current.terms):
-        margin += ACCEPTED_FURTHER_GAIN
+        margin = ACCEPTED_FURTHER_GAIN + inexact(searcher, whitener, alone.fit, current)
     else:
+        # As where the others were accepted: beside it, in whatever form it has.
+        beside = searcher.whitener(alone.fit.simulated, alone.fit)
+        margin = inexact(searcher, beside, alone.fit, current)
         margin *= max(times_beside(t) for t in further)
     if alone.evidence < evidence(current, whitener) + margin:
         return alone.fit
@@ -250,7 +253,10 @@ def swapped(
         ]
         ranked = [r for r in judged(searcher, rivals) if plausible(r.fit)]
         losers.extend(ranked)
-        better = next((r for r in ranked if _takes_over(searcher, whitener, r, leader)), None)
+        replaced = current.terms[k]
+        better = next(
+            (r for r in ranked if _takes_over(searcher, whitener, r, leader, replaced)), None
+        )
         if better is not None:
             losers.append(leader)
             leader = better
@@ -279,13 +285,22 @@ def _behind(whitener: Whitener, rival: Judged, leader: Judged) -> float:
     return own if own > 0.0 else max(own, -_in_common(whitener, rival, leader))
 
 
-def _takes_over(searcher: Searcher, whitener: Whitener, rival: Judged, leader: Judged) -> bool:
+def _takes_over(
+    searcher: Searcher, whitener: Whitener, rival: Judged, leader: Judged, replaced: Term
+) -> bool:
     """Whether an explanation takes over: it is better in its own noise and in a common one.
 
     In its own alone it gains from what it leaves unexplained and takes for noise. With more
-    parameters it may follow what the simulation is inexact about.
+    parameters it may follow what the simulation is inexact about; what the replaced one contains
+    may be a little worse.
+
+    Args:
+        searcher: The search.
+        whitener: The common null.
+        rival, leader: The two.
+        replaced: The leader's term in whose place the rival has its last.
     """
-    needed = SWAP_GAIN
+    needed = SWAP_GAIN - owed(replaced, rival.fit.terms[-1])
     if rival.fit.active > leader.fit.active:
         needed = max(needed, inexact(searcher, whitener, leader.fit, rival.fit))
     own = leader.evidence - rival.evidence

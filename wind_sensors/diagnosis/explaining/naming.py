@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,6 +61,9 @@ LATER_CANDIDATES = 6
 LARGE_CANDIDATES = 3
 """So many of the best single effects are tried beside another in the size that they have alone."""
 
+KNOWN_CANDIDATES = 3
+"""So many that came close to the first and to the second effect are tried in their places."""
+
 FINALISTS = 7
 CONTENDERS = 5
 FAR_BEHIND = 0.8
@@ -73,8 +76,37 @@ WORTH_ANOTHER_TURN = 14.0
 """Largest linear score below which no further effect is looked for."""
 
 
+@dataclass(frozen=True)
+class FirstRound:
+    """Single effects, each fitted, and the one that leads.
+
+    Attributes:
+        whitener: The null without any effect.
+        singles: Fits in it.
+        led: The leader and those that lost against it; None: none brings enough.
+    """
+
+    whitener: Whitener
+    singles: Sequence[Fit]
+    led: tuple[Judged, tuple[Alternative, ...]] | None
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The leading effect, or nothing."""
+        return () if self.led is None else self.led[0].fit.terms
+
+
+def first_round(searcher: Searcher) -> FirstRound:
+    """Fit single effects and tell which leads."""
+    whitener = searcher.whitener(searcher.bank.without)
+    singles = _single_fits(searcher, whitener)
+    return FirstRound(whitener, singles, _leading(searcher, whitener, singles, frozenset()))
+
+
 def name(
-    searcher: Searcher, progress: Callable[[float], None] | None = None
+    searcher: Searcher,
+    first: FirstRound,
+    progress: Callable[[float], None] | None = None,
 ) -> Naming:
     """Find the effects that explain the recording.
 
@@ -84,11 +116,11 @@ def name(
 
     Args:
         searcher: Prepared search.
+        first: Its first round.
         progress: Called with the share done.
     """
-    whitener = searcher.whitener(searcher.bank.without)
-    singles = _single_fits(searcher, whitener)
-    found = _greedy(searcher, progress, whitener, singles, frozenset())
+    whitener, singles = first.whitener, first.singles
+    found = _greedy(searcher, progress, first, frozenset())
     if found.fit.terms and not any(term.is_told for term in found.fit.terms):
         pair = better_pair(searcher, whitener, singles, found.fit)
         if pair is not None:
@@ -103,7 +135,8 @@ def name(
     if not broad or found.fit.active < BROAD_PARAMETERS:
         return found
     everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
-    narrow = _greedy(searcher, progress, whitener, singles, everywhere)
+    led = _leading(searcher, whitener, singles, everywhere)
+    narrow = _greedy(searcher, progress, replace(first, led=led), everywhere)
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
     simpler = (
@@ -327,43 +360,54 @@ def _beside(
     return _one_more(searcher, whitener, current, fits, first)
 
 
-def _greedy(
-    searcher: Searcher,
-    progress: Callable[[float], None] | None,
-    whitener: Whitener,
-    singles: Sequence[Fit],
-    excluded: frozenset[str],
-) -> Naming:
-    """Take the best effect, judge the noise again, and look for one beside it.
+def _leading(
+    searcher: Searcher, whitener: Whitener, singles: Sequence[Fit], excluded: frozenset[str]
+) -> tuple[Judged, tuple[Alternative, ...]] | None:
+    """The single effect that leads, and those that lost; None: none brings enough.
 
     Args:
         searcher: The search.
-        progress: Called with the share done.
         whitener: The null without any effect.
         singles: Fits of single effects in it.
         excluded: Names of effects that are not to be used.
     """
+    allowed = [f for f in singles if f.terms[0].effect.name not in excluded]
+    return _one_more(searcher, whitener, no_terms(whitener, searcher), allowed, None)
+
+
+def _greedy(
+    searcher: Searcher,
+    progress: Callable[[float], None] | None,
+    first: FirstRound,
+    excluded: frozenset[str],
+) -> Naming:
+    """Take the effect that leads, judge the noise again, and look for one beside it.
+
+    Args:
+        searcher: The search.
+        progress: Called with the share done.
+        first: Single effects and the one that leads.
+        excluded: Names of effects that are not to be used.
+    """
     report = progress or (lambda share: None)
-    current = no_terms(whitener, searcher)
+    nothing = no_terms(first.whitener, searcher)
     screened = tuple(
         (s.effect, s.instrument, s.gain)
-        for s in searcher.scores(whitener, current.vector)[:12]
+        for s in searcher.scores(first.whitener, nothing.vector)[:12]
     )
-    report(0.3)
-    allowed = [f for f in singles if f.terms[0].effect.name not in excluded]
-    first = _one_more(searcher, whitener, current, allowed, None)
-    if first is None:
+    report(0.4)
+    if first.led is None:
         report(1.0)
-        return _settled(searcher, current, (), screened)
-    leader, losers = first
-    alone = Alone(leader.fit.terms, losers)
-    report(0.5)
+        return _settled(searcher, nothing, (), screened)
+    leader, losers = first.led
+    singles = first.singles
     current, alternatives = _with_another(searcher, leader.fit, losers, singles, excluded)
     report(0.8)
     if len(current.terms) == 1 and current.terms[0].key != leader.fit.terms[0].key:
         # What took the place of two may stand beside another one itself.
         current, alternatives = _with_another(searcher, current, alternatives, singles, excluded)
     report(1.0)
+    alone = Alone(leader.fit.terms, losers)
     return replace(_settled(searcher, current, alternatives, screened), alone=alone)
 
 
@@ -389,7 +433,9 @@ def _with_another(
     current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
     if second is None:
         return current, losers
-    newest = [term for a in (*second[1], *losers) for term in a.fit.terms[-1:]]
+    newest = [
+        a.fit.terms[-1] for a in (*second[1][:KNOWN_CANDIDATES], *losers[:KNOWN_CANDIDATES])
+    ]
     pair = pruned(searcher, whitener, current)
     current = merged(
         searcher, whitener, pair, [first.terms, *((term,) for term in newest)], excluded

@@ -42,6 +42,9 @@ may differ from the simulation's."""
 STIRRED_KINDS = frozenset({"frequency", "spectrum", "activity"})
 """Of these an effect that brings eddies of its own leaves more than the simulation knows."""
 
+STIRRED_TIMES = 5.0
+"""So many times more. A mast that sways leaves many times that in one band."""
+
 REMAINDER_SCORE = 0.8
 REMAINDER_SHARE = 0.025
 LEAST_REMAINDER = 0.006
@@ -122,19 +125,17 @@ def remainder_of(
 
     What another instrument shows beside them says nothing against the names, unless it carries the
     one that they change (a vane off the wind takes its propeller along), nor does what a healthy
-    day shows as loudly, nor the power of eddies if they bring some of their own.
+    day shows as loudly, nor some more power of eddies if they bring eddies of their own.
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
         changed = _changed(naming)
         channels = changed | _carriers(comparison, changed)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
-        counts = [
-            r.channel in channels and not (stirred and r.kind in STIRRED_KINDS)
-            for r in bank.regions
-        ]
+        own = [stirred and r.kind in STIRRED_KINDS for r in bank.regions]
         outside = [_is_outside(r, naming) for r in bank.regions]
-        scores = np.where(counts, scores, 0.0) * np.where(outside, REMAINDER_SCORE, 1.0)
+        scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
+        scores *= np.where(outside, REMAINDER_SCORE, 1.0) / np.where(own, STIRRED_TIMES, 1.0)
     score, relative = _largest(scores, bank, comparison, baseline)
     share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
     return Remainder(relative, bank.p_value(score), share)
