@@ -15,7 +15,12 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.naming import first_round, name, named_alone
+from wind_sensors.diagnosis.explaining.naming import (
+    first_round,
+    kept_if_better,
+    name,
+    named_alone,
+)
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
@@ -177,8 +182,10 @@ def diagnose(
         rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
         follows = comparison.where_vanes_follow(rivals)
         if comparison.misfit_outside(follows, naming.fit.simulated) > TURNING_MISFIT:
+            before = naming
             comparison = comparison.within(follows)
             searcher, naming = _explained(comparison, baseline, known, workers, report)
+            naming = kept_if_better(searcher, before, naming)
     judged = judgement_of(searcher, naming, baseline, workers, report, with_proof)
     if not judged.is_claim:
         # A second effect that does not hold must not take the first one along.

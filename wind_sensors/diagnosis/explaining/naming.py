@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wind_sensors.diagnosis.explaining.acceptance import (
+    all_plausible,
     is_a_stall,
     may_join,
     needed_gain,
@@ -147,6 +148,26 @@ def name(
         return found
     enough = NARROW_SHARE * _gain_beside(searcher, found, narrow)
     return narrow if _gain_beside(searcher, narrow, found) > enough else found
+
+
+def kept_if_better(searcher: Searcher, known: Naming, found: Naming) -> Naming:
+    """What was found, or what was known before if it fits clearly better.
+
+    Args:
+        searcher: The search that found the former.
+        known: An explanation of the same recording, of which other parts counted.
+        found: What was found.
+    """
+    if {t.key for t in known.fit.terms} == {t.key for t in found.fit.terms}:
+        return found
+    null = found.whitener
+    again = fit(null, searcher.station, known.fit.terms, searcher.bank.without)
+    best, other = judged(searcher, [again, found.fit])
+    wins = [t.key for t in best.fit.terms] == [t.key for t in known.fit.terms]
+    if not wins or best.evidence > other.evidence - CLEARLY_BETTER or not all_plausible(best.fit):
+        return found
+    settled = _settled(searcher, best.fit, found.alternatives, found.screened)
+    return replace(settled, alone=found.alone)
 
 
 def _gain_beside(searcher: Searcher, one: Naming, other: Naming) -> float:
@@ -293,7 +314,8 @@ def _further_fits(
         for starts in window_starts(searcher, whitener, current.vector, used)
         if eligible(starts)
     ]
-    if not windowed:
+    apart = _promising_apart(searcher, current, singles)
+    if not windowed and not apart:
         scores = searcher.scores(whitener, current.vector)
         if all(
             s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
@@ -305,15 +327,37 @@ def _further_fits(
         if eligible(starts) and not is_a_stall(searcher, current, starts[0])
     ]
     known = {starts[0].key: starts for starts in candidates}
-    for single in sorted(singles, key=total)[:LARGE_CANDIDATES]:
+    for single in (*sorted(singles, key=total)[:LARGE_CANDIDATES], *apart):
         (term,) = single.terms
         if term.interval != ALWAYS or not eligible([term]):
             continue
         if term.key in known:
             known[term.key].append(term)
         else:
-            candidates.append([term])
+            known[term.key] = [term]
+            candidates.append(known[term.key])
     return searcher.fit_all(whitener, current, [*candidates, *windowed])
+
+
+def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -> list[Fit]:
+    """Single effects on signals of their own that explain much in the noise that they leave.
+
+    What makes a signal more or less lively hides in the noise as long as it is not simulated.
+
+    Args:
+        searcher: The search.
+        current: The terms so far.
+        singles: Fits of single effects.
+    """
+    null = searcher.whitener(searcher.bank.without)
+    so_far = evidence(no_terms(null, searcher), null)
+    own = [
+        (in_own_noise(searcher, f, None), f)
+        for f in singles
+        if f.terms[0].interval == ALWAYS and searcher.is_apart(current, f.terms[0])
+    ]
+    promising = [(cost, f) for cost, f in own if so_far - cost > WORTH_ANOTHER_TURN]
+    return [f for _, f in sorted(promising, key=lambda pair: pair[0])[:LARGE_CANDIDATES]]
 
 
 def _one_more(
@@ -408,7 +452,14 @@ def _greedy(
         current, alternatives = _with_another(searcher, current, alternatives, singles, excluded)
     report(1.0)
     alone = Alone(leader.fit.terms, losers)
-    return replace(_settled(searcher, current, alternatives, screened), alone=alone)
+    found = _settled(searcher, current, alternatives, screened)
+    gone = {t.effect.name for t in current.terms} - {t.effect.name for t in found.fit.terms}
+    if found.fit.terms and gone:
+        # Beside what is left there may be something else in the place of what cannot be.
+        again = _with_another(searcher, found.fit, (), singles, excluded | gone)
+        if len(again[0].terms) > 1:
+            found = _settled(searcher, *again, screened)
+    return replace(found, alone=alone)
 
 
 def _with_another(

@@ -100,7 +100,9 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             value = term.values[parameter.name]
             departure = 0.0 if parameter.healthy is None else value - parameter.healthy
             noise = MISMATCH_FACTOR * float(np.sqrt(max(variance, 0.0)))
-            if parameter.name in term.held:
+            if parameter.name in term.held and parameter.healthy is None:
+                noise = parameter.step
+            elif parameter.name in term.held:
                 noise = 0.0 if departure != 0.0 else np.inf
             elif parameter.value_from == "signals" and parameter.graded:
                 noise = 0.0
