@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +13,7 @@ from test_diagnosis_naming import STATION, baseline, recorded
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.acceptance import owed
 from wind_sensors.diagnosis.explaining.fitting import Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.moves import simplified, swapped
@@ -159,3 +162,25 @@ def test_an_effect_of_a_pair_is_exchanged_for_what_competed_before() -> None:
     # Nothing of the rotor takes the vane's place, or the other way round.
     for loser in losers:
         assert {t.instrument for t in loser.fit.terms} & {"vane", "station"}
+
+
+def test_a_rotor_of_another_calibration_is_not_called_damaged() -> None:
+    # A damaged cup pulls less and reads less: without the former it is a calibration.
+    station = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 0.85})
+    found = diagnose(recorded(station, 79), baseline(), with_proof=False)
+    assert {f.term.effect.name for f in found.findings} == {"calibration_drift"}
+    damaged = Term(catalogue()["damaged_cup"], "cup", {"torque_harmonic": 0.05, "gain": 0.9})
+    drift = Term(catalogue()["calibration_drift"], "cup", {"gain": 0.9})
+    assert owed(damaged, drift) > 0.0
+    assert owed(drift, damaged) == 0.0
+    assert owed(damaged, replace(drift, instrument="other")) == 0.0
+
+
+def test_bounces_tell_their_delay() -> None:
+    effects = catalogue()
+    bounce = {"bounce_probability": 0.06, "bounce_delay": 0.0017}
+    station = with_effect(STATION, effects["extra_pulses"], "cup", bounce)
+    comparison = prepare(recorded(station, 79))
+    (guess,) = (t for t in guesses_of(comparison, STATION)[("extra_pulses", "cup")])
+    assert guess.held == {"bounce_delay"}
+    assert guess.values["bounce_delay"] == pytest.approx(0.0017, rel=0.02)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.healthy.baseline import Baseline
@@ -111,3 +112,30 @@ def test_a_dead_log_is_found_and_replaced_by_the_positions() -> None:
         for station in (uav(), found.station)
     )
     assert right < 0.3 * wrong
+
+
+def test_a_log_in_knots_is_a_scale_of_the_velocity() -> None:
+    flight = flown(uav(), 52)
+    assert flight.platform is not None
+    knots = flight.platform.velocity / 0.5144
+    found = diagnose(
+        replace(flight, platform=replace(flight.platform, velocity=knots)), three_flights()
+    )
+    (finding,) = found.findings
+    assert finding.term.key == ("platform_velocity_scale", "platform")
+    assert finding.parameters["velocity_scale"].value == pytest.approx(1.0 / 0.5144, rel=0.03)
+
+
+def test_eddies_are_measured_by_the_wind_that_the_named_motion_gives() -> None:
+    # With a dead log the air seems to pass the sensors as fast as it passes the ground.
+    flight = flown(uav(), 51)
+    assert flight.platform is not None
+    still = np.zeros_like(flight.platform.velocity)
+    dead = replace(flight, platform=replace(flight.platform, velocity=still))
+    found = diagnose(dead, three_flights(), with_proof=False)
+    right, wrong = prepare(flight).speed, prepare(dead).speed
+    away = float(np.sqrt(np.mean(np.square(wrong - right))))
+    assert away > 0.5
+    assert np.sqrt(np.mean(np.square(found.comparison.speed - right))) < 0.2 * away
+    # What is compared stays the station as it was described, seen in that wind.
+    assert found.comparison.station.platform == uav().platform

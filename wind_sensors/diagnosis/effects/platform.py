@@ -96,6 +96,8 @@ PLATFORM_VELOCITY = Effect(
     equation="apparent wind = wind - share * ((1 - q) V + q d(position)/dt + omega x r)",
     source="rigid-body kinematics",
     region="with the carrier's speed and heading",
+    # A share of a velocity is a scale of it.
+    contains=frozenset({"platform_velocity_scale"}),
     parameters=(
         Parameter(
             "velocity_share", "1", -1.2, 1.0, healthy=1.0, minimum=MISSING_SHARE,

@@ -131,7 +131,7 @@ AIR_DENSITY = Effect(
     region="with temperature and pressure; response length and low speeds",
     smooths=True,
     parameters=(
-        Parameter("density_ratio", "1", 0.4, 2.5, healthy=1.0, minimum=0.1, step=0.04),
+        Parameter("density_ratio", "1", 0.3, 2.5, healthy=1.0, minimum=0.1, step=0.04),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_density,

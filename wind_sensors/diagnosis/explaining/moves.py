@@ -45,6 +45,7 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 MERGE_CANDIDATES = 8
 MERGE_FINALISTS = 3
 SWAP_CANDIDATES = 5
+SWAP_FINALISTS = 4
 SWAP_GAIN = 1.0
 
 
@@ -207,10 +208,11 @@ def merged(
     if len(further) == len(current.terms):
         margin = ACCEPTED_FURTHER_GAIN + inexact(searcher, whitener, alone.fit, current)
     else:
-        # As where the others were accepted: beside it, in whatever form it has.
-        beside = searcher.whitener(alone.fit.simulated, alone.fit)
-        margin = inexact(searcher, beside, alone.fit, current)
-        margin *= max(times_beside(t) for t in further)
+        # As where the others were accepted: beside it, in whatever form it has. What passes follows
+        # the swings of any form.
+        times = max(times_beside(t) for t in further)
+        form = whitener if times > 1.0 else searcher.whitener(alone.fit.simulated, alone.fit)
+        margin = times * inexact(searcher, form, alone.fit, current)
     if alone.evidence < evidence(current, whitener) + margin:
         return alone.fit
     return current
@@ -251,7 +253,8 @@ def swapped(
         rivals = [
             f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)
         ]
-        ranked = [r for r in judged(searcher, rivals) if plausible(r.fit)]
+        nearest = sorted(rivals, key=total)[:SWAP_FINALISTS]
+        ranked = [r for r in judged(searcher, nearest) if plausible(r.fit)]
         losers.extend(ranked)
         replaced = current.terms[k]
         better = next(
