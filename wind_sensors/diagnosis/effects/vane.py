@@ -93,7 +93,7 @@ VANE_DAMPING = Effect(
     smooths=True,
     parameters=(
         Parameter(
-            "damping_factor", "1", 0.05, 60.0, healthy=1.0, minimum=0.4, step=0.1,
+            "damping_factor", "1", 0.05, 20.0, healthy=1.0, minimum=0.4, step=0.1,
             starts=(0.5, 2.0, 4.0, 10.0),
         ),
     ),
