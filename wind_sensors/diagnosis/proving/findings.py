@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
-from wind_sensors.diagnosis.explaining.acceptance import owed, passing_gain
+from wind_sensors.diagnosis.explaining.acceptance import passing_gain
 from wind_sensors.diagnosis.explaining.explanation import (
     EQUAL_LIKELIHOOD,
     EQUAL_SHARE,
@@ -133,7 +133,7 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
     """Explanations that fit as well with one effect exchanged: its position, the explanation.
 
     One with more parameters could follow what the simulation is inexact about: if it is behind all
-    the same, only the likelihood speaks for it. What contains an effect and fits hardly better adds
+    the same, only the likelihood speaks for it. What contains an effect and fits no better adds
     something to it that the recording does not show. What passes and brings too little to be named
     by itself is no rival either, nor beside what always holds what would not be named beside it.
     """
@@ -150,8 +150,7 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
         if len(theirs) != len(own) or len(missing) != 1 or theirs[-1] in seen:
             continue
         newest, rival = alternative.fit.terms[-1], naming.fit.terms[missing[0]]
-        more = owed(newest, rival)
-        if more and alternative.behind > -more:
+        if rival.effect.name in newest.effect.contains and alternative.behind > 0.0:
             continue
         least = passing_gain(newest, beside=always)
         if len(own) == 1 and naming.gain - alternative.behind < least:
