@@ -1,6 +1,8 @@
-"""Sizes as people read them: bearings of the compass or of the bow, days, units."""
+"""Names and sizes as people read them: what is told apart, bearings, days, units."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.fitting import Term
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.report.names import names_of
 from wind_sensors.report.sizes import sizes_of
 from wind_sensors.station.model import Platform, Station
 
@@ -74,3 +77,18 @@ def test_long_times_are_days_and_short_ones_seconds() -> None:
 def test_what_has_no_interval_shows_none() -> None:
     unknown = finding("calibration_drift", gain=Estimate(0.93, float("nan"), float("nan"), "1"))
     assert sizes_of(unknown, STATION)[0].text == "gain 0.93"
+
+
+def test_what_acts_together_and_what_is_not_told_apart_read_differently() -> None:
+    late, offset, gain = (
+        finding(name) for name in ("clock_drift", "calibration_offset", "calibration_drift")
+    )
+    assert names_of([]) == ""
+    assert names_of([late]) == "clock drift (cup)"
+    assert names_of([late, offset]) == "clock drift (cup) and calibration offset (cup)"
+    either = [replace(offset, set_number=2), replace(gain, set_number=2)]
+    assert names_of(either) == "calibration offset (cup) or calibration drift (cup)"
+    # The second of two effects has an alternative, the first has none.
+    assert names_of([late, *either]) == (
+        "clock drift (cup), and calibration offset (cup) or calibration drift (cup)"
+    )

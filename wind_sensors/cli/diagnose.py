@@ -19,6 +19,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.diagnosis_files import make_way, write
 from wind_sensors.report.diagnosis_page import when_text
+from wind_sensors.report.names import names_of
 from wind_sensors.report.sizes import sizes_of
 
 
@@ -98,11 +99,14 @@ def catalogue_without(names: Sequence[str]) -> dict[str, Effect]:
 
 
 def _print(console: Console, diagnosis: Diagnosis) -> None:
-    console.print(f"[bold]{diagnosis.recording}[/bold]: {diagnosis.verdict}")
+    names = names_of(diagnosis.findings)
+    console.print(
+        f"[bold]{diagnosis.recording}[/bold]: {diagnosis.verdict}" + (f": {names}" if names else "")
+    )
     if diagnosis.findings:
         table = Table(box=None)
         for column in ("effect", "instrument", "when", "size", "95 % interval", "held out"):
-            table.add_column(column, overflow="fold")
+            table.add_column(column, overflow="fold", no_wrap=column == "effect")
         for finding in diagnosis.findings:
             removed = ""
             if finding.proof is not None:

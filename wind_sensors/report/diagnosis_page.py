@@ -22,7 +22,8 @@ from wind_sensors.report.diagnosis_figures import (
     residual_figure,
     statistics_figure,
 )
-from wind_sensors.report.sizes import number_text, sizes_of, words
+from wind_sensors.report.names import names_of, words
+from wind_sensors.report.sizes import number_text, sizes_of
 from wind_sensors.station.model import Station
 
 STYLE = """
@@ -51,22 +52,15 @@ th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 VERDICTS = {
     "none": "Nothing is wrong that this recording could show",
     "named": "The missing physics has a name",
-    "ambiguous": "The missing physics is one of these",
+    "ambiguous": "The data do not tell apart what stands on either side of an \"or\"",
     "unknown": "Something is wrong that no known effect explains",
     "inconclusive": "Too short or too calm to tell",
 }
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    if diagnosis.findings and diagnosis.verdict == "named":
-        names = " and ".join(
-            f"{words(f.term.effect.name)} ({f.term.instrument})" for f in diagnosis.findings
-        )
-        return names[0].upper() + names[1:]
-    if diagnosis.findings:
-        names = " or ".join(words(f.term.effect.name) for f in diagnosis.findings)
-        return names[0].upper() + names[1:]
-    return VERDICTS[diagnosis.verdict]
+    headline = names_of(diagnosis.findings) or VERDICTS[diagnosis.verdict]
+    return headline[0].upper() + headline[1:]
 
 
 def when_text(term: Term) -> str:

@@ -13,7 +13,8 @@ from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
 from wind_sensors.report.cuts import in_both_cuts, title_for
 from wind_sensors.report.diagnosis_page import VERDICTS, document
-from wind_sensors.report.sizes import number_text, sizes_of, words
+from wind_sensors.report.names import names_of, words
+from wind_sensors.report.sizes import number_text, sizes_of
 from wind_sensors.station.model import Station
 
 
@@ -91,14 +92,14 @@ def _finding(finding: Finding, station: Station) -> str:
 
 
 def _headline(outcome: Outcome) -> str:
-    """The named effects, each with its instruments."""
+    """The named effects, each with its instruments; without any, what is not told apart."""
     instruments: dict[str, dict[str, None]] = {}
     for finding in outcome.findings:
         if finding.set_number == 0:
             name = words(finding.term.effect.name)
             instruments.setdefault(name, {})[finding.term.instrument] = None
     named = "; ".join(f"{name} ({', '.join(on)})" for name, on in instruments.items())
-    headline = named or VERDICTS[outcome.verdict]
+    headline = named or names_of(outcome.findings) or VERDICTS[outcome.verdict]
     return headline[0].upper() + headline[1:]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.report.names import words
 from wind_sensors.station.model import Station
 
 DAY = 86400.0
@@ -31,11 +32,6 @@ class Size:
         unit = f" {self.unit}" if self.unit else ""
         interval = f" ({self.low} to {self.high})" if self.low else ""
         return f"{self.name} {self.value}{unit}{interval}"
-
-
-def words(effect: str) -> str:
-    """An identifier for people."""
-    return effect.replace("_", " ")
 
 
 def number_text(value: float) -> str:
