@@ -18,7 +18,8 @@ from wind_sensors.diagnosis.explaining.explanation import Alternative, Judged, N
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
 from wind_sensors.diagnosis.explaining.moves import merged
-from wind_sensors.diagnosis.explaining.naming import blind_starts, first_round, name, named_alone
+from wind_sensors.diagnosis.explaining.naming import name, named_alone
+from wind_sensors.diagnosis.explaining.rounds import blind_starts, first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORE, remainder_of, unstirred
 from wind_sensors.diagnosis.proving.findings import equal_explanations

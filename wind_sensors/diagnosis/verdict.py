@@ -15,12 +15,8 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.naming import (
-    first_round,
-    kept_if_better,
-    name,
-    named_alone,
-)
+from wind_sensors.diagnosis.explaining.naming import kept_if_better, name, named_alone
+from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm

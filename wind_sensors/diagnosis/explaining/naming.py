@@ -3,39 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from wind_sensors.diagnosis.explaining.acceptance import (
     all_plausible,
-    is_a_stall,
-    may_join,
-    needed_gain,
-    plausible,
-    too_small,
 )
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
     Alone,
     Alternative,
-    Judged,
     Naming,
-    evidence,
-    in_own_noise,
     judged,
     no_terms,
     seen_in,
     total,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, covariance_of, fit
-from wind_sensors.diagnosis.explaining.guesses import BLIND_IN_PARTS
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, covariance_of, fit
 from wind_sensors.diagnosis.explaining.leading import (
-    held_throughout,
-    leader_of,
     leading_alone,
-    not_told,
 )
 from wind_sensors.diagnosis.explaining.moves import (
     looked_around,
@@ -44,11 +30,15 @@ from wind_sensors.diagnosis.explaining.moves import (
     simplified,
     swapped,
 )
-from wind_sensors.diagnosis.explaining.onsets import refined_interval, window_starts, with_interval
+from wind_sensors.diagnosis.explaining.onsets import with_interval
 from wind_sensors.diagnosis.explaining.pairs import better_pair
+from wind_sensors.diagnosis.explaining.rounds import (
+    CONTENDERS,
+    FirstRound,
+    best_beside,
+    best_single,
+)
 from wind_sensors.diagnosis.explaining.search import Searcher
-from wind_sensors.diagnosis.explaining.signatures import in_parallel
-from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 NARROW_SHARE = 0.85
 """Effects of single instruments win over broad ones from this share of their gain on, beyond what
@@ -57,51 +47,8 @@ both explanations share, if they need fewer parameters."""
 BROAD_PARAMETERS = 3
 """From so many fitted parameters on, an explanation with a broad effect is challenged."""
 
-FIRST_CANDIDATES = 9
-LATER_CANDIDATES = 6
-LARGE_CANDIDATES = 3
-"""So many of the best single effects are tried beside another in the size that they have alone."""
-
 KNOWN_CANDIDATES = 3
 """So many that came close to the first and to the second effect are tried in their places."""
-
-FINALISTS = 7
-CONTENDERS = 5
-FAR_BEHIND = 0.8
-"""Fits that miss more than this share of the leader's gain do not compete with it."""
-
-WORTH_JUDGING = 0.5
-"""Share of the needed gain that a fit must bring before the noise is judged again."""
-
-WORTH_ANOTHER_TURN = 14.0
-"""Largest linear score below which no further effect is looked for."""
-
-
-@dataclass(frozen=True)
-class FirstRound:
-    """Single effects, each fitted, and the one that leads.
-
-    Attributes:
-        whitener: The null without any effect.
-        singles: Fits in it.
-        led: The leader and those that lost against it; None: none brings enough.
-    """
-
-    whitener: Whitener
-    singles: Sequence[Fit]
-    led: tuple[Judged, tuple[Alternative, ...]] | None
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The leading effect, or nothing."""
-        return () if self.led is None else self.led[0].fit.terms
-
-
-def first_round(searcher: Searcher) -> FirstRound:
-    """Fit single effects and tell which leads."""
-    whitener = searcher.whitener(searcher.bank.without)
-    singles = _single_fits(searcher, whitener)
-    return FirstRound(whitener, singles, _leading(searcher, whitener, singles, frozenset()))
 
 
 def name(
@@ -136,7 +83,7 @@ def name(
     if not broad or found.fit.active < BROAD_PARAMETERS:
         return found
     everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
-    led = _leading(searcher, whitener, singles, everywhere)
+    led = best_single(searcher, whitener, singles, everywhere)
     narrow = _greedy(searcher, progress, replace(first, led=led), everywhere)
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
@@ -170,253 +117,20 @@ def kept_if_better(searcher: Searcher, known: Naming, found: Naming) -> Naming:
     return replace(settled, alone=found.alone)
 
 
-def _gain_beside(searcher: Searcher, one: Naming, other: Naming) -> float:
-    """Drop of the cost by those effects of an explanation that another one does not have."""
-    known = {term.key for term in other.fit.terms}
-    shared = [term for term in one.fit.terms if term.key in known]
-    if not shared:
-        return one.gain
-    without = fit(one.whitener, searcher.station, shared, searcher.bank.without, least=ROUGHLY)
-    return without.cost - one.fit.cost
-
-
-def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
-    """Whether an explanation fits clearly better than another."""
-    first, second = judged(searcher, [one.fit, other.fit])
-    wins = [t.key for t in first.fit.terms] == [t.key for t in one.fit.terms]
-    margin = max(CLEARLY_BETTER, EQUAL_SHARE * other.gain)
-    return wins and first.evidence < second.evidence - margin
-
-
-def _with_sharp_intervals(
-    searcher: Searcher, null: Whitener, ranked: Sequence[Judged], named: Fit | None
-) -> list[Judged]:
-    """The same explanations with beginnings and ends where they fit best; best first.
+def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:
+    """The explanation by the single effect that led before a second one joined it.
 
     Args:
         searcher: The search.
-        null: Of the terms so far.
-        ranked: Explanations with one more.
-        named: The terms so far; None: there are none.
+        naming: An explanation; None comes back where it is no pair or began with none.
     """
-
-    def sharper(one: Judged) -> Fit:
-        return refined_interval(searcher, one.whitener, one.fit)
-
-    passing = [
-        r
-        for r in ranked
-        if r.fit.terms[-1].interval != ALWAYS and not r.fit.terms[-1].effect.legible
-    ]
-    lasting = [r for r in ranked if not any(r is p for p in passing)]
-    sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
-    others = searcher.refit_all(null, _fuller(searcher, sharp))
-    if sharp:
-        others += searcher.fit_all(null, named, blind_starts(searcher, sharp))
-    sound = judged(searcher, [f for f in others if plausible(f)], named)
-    if sound and sound[0].evidence < sharp[0].evidence:
-        # The interval is that of another effect so far.
-        sound += judged(searcher, [sharper(sound[0])], named)
-    return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
-
-
-def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
-    """Starting points, in the best of the intervals, of effects that the screening hardly sees.
-
-    Of those that act on the signals which the last effect there reaches: effects of which the raw
-    signals give a guess, and on the same instrument those that the last one is mistaken for.
-
-    Args:
-        searcher: The search.
-        passing: Explanations whose last effect begins or ends inside the record, best first.
-    """
-    *others, last = passing[0].fit.terms
-    reached = set(searcher.comparison.affected(searcher.station, last.instrument))
-    newest = [one.fit.terms[-1] for one in passing]
-    known = {term.key for term in newest if term.interval == last.interval}
-    starts = {
-        key: list(guesses)
-        for key, guesses in searcher.guesses.items()
-        if key[0] in BLIND_IN_PARTS
-    }
-    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
-    for effect in searcher.effects.values():
-        key = (effect.name, last.instrument)
-        confusable = effect.name in last.effect.confusable or last.effect.name in effect.confusable
-        if confusable and key in possible and key not in starts and not effect.legible:
-            starts[key] = [Term(effect, key[1], dict(values)) for values in effect.templates]
-    return [
-        [replace(start, interval=last.interval) for start in of_one]
-        for key, of_one in starts.items()
-        if key not in known
-        and reached & set(searcher.comparison.affected(searcher.station, key[1]))
-        and may_join(of_one[0], others)
-    ]
-
-
-def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
-    """Explanations with an effect that contains the last one in its place, in the same interval.
-
-    Of several effects that begin at the same time the simplest is screened first.
-    """
-    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
-    found: dict[tuple[str, str], list[Term]] = {}
-    for one in passing:
-        *others, last = one.fit.terms
-        for effect in searcher.effects.values():
-            key = (effect.name, last.instrument)
-            if last.effect.name not in effect.contains or key not in possible or key in found:
-                continue
-            shared = {p.name: last.values[p.name] for p in effect.parameters
-                      if p.name in last.values}
-            values = {**effect.templates[0], **shared}
-            found[key] = [*others, replace(last, effect=effect, values=values)]
-    return list(found.values())
-
-
-def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:
-    """Fits of the most promising effects, each alone."""
-    vector = whitener.of(searcher.bank.without)
-    return searcher.fit_all(
-        whitener,
-        None,
-        [
-            *searcher.single_candidates(whitener, vector, FIRST_CANDIDATES, blind=True),
-            *window_starts(searcher, whitener, vector, set()),
-        ],
-    )
-
-
-def _further_fits(
-    searcher: Searcher,
-    whitener: Whitener,
-    current: Fit,
-    singles: Sequence[Fit],
-    excluded: frozenset[str],
-) -> list[Fit]:
-    """Fits of the terms so far with one more each.
-
-    Args:
-        searcher: The search.
-        whitener: The null of the terms so far.
-        current: The terms so far.
-        singles: Fits of single effects: of the best the size that they have alone is tried, too,
-            where a small one shows no way.
-        excluded: Names of effects that are not to be used.
-    """
-    used = {t.key for t in current.terms}
-
-    def eligible(starts: Sequence[Term]) -> bool:
-        return may_join(starts[0], current.terms) and starts[0].effect.name not in excluded
-
-    windowed = [
-        starts
-        for starts in window_starts(searcher, whitener, current.vector, used)
-        if eligible(starts)
-    ]
-    apart = _promising_apart(searcher, current, singles)
-    if not windowed and not apart:
-        scores = searcher.scores(whitener, current.vector)
-        if all(
-            s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
-        ):
-            return []
-    candidates = [
-        starts
-        for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
-        if eligible(starts) and not is_a_stall(searcher, current, starts[0])
-    ]
-    known = {starts[0].key: starts for starts in candidates}
-    for single in (*sorted(singles, key=total)[:LARGE_CANDIDATES], *apart):
-        (term,) = single.terms
-        if term.interval != ALWAYS or not eligible([term]):
-            continue
-        if term.key in known:
-            known[term.key].append(term)
-        else:
-            known[term.key] = [term]
-            candidates.append(known[term.key])
-    return searcher.fit_all(whitener, current, [*candidates, *windowed])
-
-
-def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -> list[Fit]:
-    """Single effects on signals of their own that explain much in the noise that they leave.
-
-    What makes a signal more or less lively hides in the noise as long as it is not simulated.
-
-    Args:
-        searcher: The search.
-        current: The terms so far.
-        singles: Fits of single effects.
-    """
-    null = searcher.whitener(searcher.bank.without)
-    so_far = evidence(no_terms(null, searcher), null)
-    own = [
-        (in_own_noise(searcher, f, None), f)
-        for f in singles
-        if f.terms[0].interval == ALWAYS and searcher.is_apart(current, f.terms[0])
-    ]
-    promising = [(cost, f) for cost, f in own if so_far - cost > WORTH_ANOTHER_TURN]
-    return [f for _, f in sorted(promising, key=lambda pair: pair[0])[:LARGE_CANDIDATES]]
-
-
-def _one_more(
-    searcher: Searcher, whitener: Whitener, current: Fit, fits: Sequence[Fit], named: Fit | None
-) -> tuple[Judged, tuple[Alternative, ...]] | None:
-    """The best explanation with one effect more, and those that lost; None: none brings enough.
-
-    Args:
-        searcher: The search.
-        whitener: The null of the terms so far.
-        current: The terms so far.
-        fits: With one more each.
-        named: The terms so far; None: there are none.
-    """
-    sound = [f for f in fits if plausible(f) and not too_small(searcher, f, total(current))]
-    pool = _finalists(searcher, whitener, current, sound, named)
-    if not pool:
+    if naming.alone is None or len(naming.fit.terms) < 2:
         return None
-    ranked = [r for r in judged(searcher, pool, named, roughly=True) if plausible(r.fit)]
-    ranked.sort(key=not_told)
-    ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
-    ranked = [r for r in ranked if plausible(r.fit)]
-    ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
-    best = leader_of(searcher, whitener, current, ranked)
-    if best is None:
-        return None
-    leader = held_throughout(searcher, best, named)
-    losers = tuple(
-        Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not best
-    )
-    return leader, losers
-
-
-def _beside(
-    searcher: Searcher, first: Fit, singles: Sequence[Fit], excluded: frozenset[str]
-) -> tuple[Judged, tuple[Alternative, ...]] | None:
-    """The best effect beside those so far; None: none brings enough.
-
-    What is left is judged as what the named effects, in another form, do not explain.
-    """
-    whitener = searcher.whitener(first.simulated, first)
-    current = seen_in(whitener, first)
-    fits = _further_fits(searcher, whitener, current, singles, excluded)
-    return _one_more(searcher, whitener, current, fits, first)
-
-
-def _leading(
-    searcher: Searcher, whitener: Whitener, singles: Sequence[Fit], excluded: frozenset[str]
-) -> tuple[Judged, tuple[Alternative, ...]] | None:
-    """The single effect that leads, and those that lost; None: none brings enough.
-
-    Args:
-        searcher: The search.
-        whitener: The null without any effect.
-        singles: Fits of single effects in it.
-        excluded: Names of effects that are not to be used.
-    """
-    allowed = [f for f in singles if f.terms[0].effect.name not in excluded]
-    return _one_more(searcher, whitener, no_terms(whitener, searcher), allowed, None)
+    whitener = searcher.whitener(searcher.bank.without)
+    single = fit(whitener, searcher.station, naming.alone.terms, searcher.bank.without)
+    whitener = searcher.whitener(single.simulated)
+    single = fit(whitener, searcher.station, single.terms, searcher.bank.without)
+    return _settled(searcher, single, naming.alone.alternatives, naming.screened)
 
 
 def _greedy(
@@ -478,7 +192,7 @@ def _with_another(
         singles: Fits of single effects.
         excluded: Names of effects that are not to be used.
     """
-    second = _beside(searcher, first, singles, excluded)
+    second = best_beside(searcher, first, singles, excluded)
     current = first if second is None else second[0].fit
     whitener = searcher.whitener(current.simulated)
     current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
@@ -498,59 +212,6 @@ def _with_another(
         # What would replace both does less than the first does alone.
         current = pair
     return swapped(searcher, whitener, current, newest, excluded)
-
-
-def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:
-    """The explanation by the single effect that led before a second one joined it.
-
-    Args:
-        searcher: The search.
-        naming: An explanation; None comes back where it is no pair or began with none.
-    """
-    if naming.alone is None or len(naming.fit.terms) < 2:
-        return None
-    whitener = searcher.whitener(searcher.bank.without)
-    single = fit(whitener, searcher.station, naming.alone.terms, searcher.bank.without)
-    whitener = searcher.whitener(single.simulated)
-    single = fit(whitener, searcher.station, single.terms, searcher.bank.without)
-    return _settled(searcher, single, naming.alone.alternatives, naming.screened)
-
-
-def _finalists(
-    searcher: Searcher,
-    whitener: Whitener,
-    current: Fit,
-    fits: Sequence[Fit],
-    named: Fit | None,
-) -> list[Fit]:
-    """The fits that may win, in the null of the terms so far or in that which each leaves itself.
-
-    In the former, noise and coherence were judged with the mismatch still in them.
-
-    Args:
-        searcher: The search.
-        whitener: The null of the terms so far.
-        current: The terms so far.
-        fits: With one term more each.
-        named: The terms so far; None: there are none.
-    """
-    found: dict[int, Fit] = {k: f for k, f in enumerate(fits) if f.terms[-1].is_told}
-    own = [in_own_noise(searcher, f, named) for f in fits]
-    worth = False
-    for costs, so_far in (
-        ([total(f) for f in fits], total(current)),
-        (own, evidence(current, whitener)),
-    ):
-        order = np.argsort(costs, kind="stable")[:FINALISTS]
-        best = min(costs, default=so_far)
-        for k in order:
-            if costs[k] - best <= FAR_BEHIND * (so_far - best):
-                found[int(k)] = fits[k]
-        worth = worth or any(
-            so_far - cost >= WORTH_JUDGING * needed_gain(current, f.terms[-1], searcher.baseline)
-            for cost, f in zip(costs, fits, strict=True)
-        )
-    return list(found.values()) if worth else []
 
 
 def _settled(
@@ -586,3 +247,21 @@ def _settled(
         current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
         alternatives, screened,
     )  # fmt: skip
+
+
+def _gain_beside(searcher: Searcher, one: Naming, other: Naming) -> float:
+    """Drop of the cost by those effects of an explanation that another one does not have."""
+    known = {term.key for term in other.fit.terms}
+    shared = [term for term in one.fit.terms if term.key in known]
+    if not shared:
+        return one.gain
+    without = fit(one.whitener, searcher.station, shared, searcher.bank.without, least=ROUGHLY)
+    return without.cost - one.fit.cost
+
+
+def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
+    """Whether an explanation fits clearly better than another."""
+    first, second = judged(searcher, [one.fit, other.fit])
+    wins = [t.key for t in first.fit.terms] == [t.key for t in one.fit.terms]
+    margin = max(CLEARLY_BETTER, EQUAL_SHARE * other.gain)
+    return wins and first.evidence < second.evidence - margin
