@@ -72,24 +72,27 @@ class Diagnosis:
 
 def _explained(
     comparison: Comparison,
-    baseline: Baseline,
-    effects: Mapping[str, Effect],
-    workers: int,
+    search: Callable[[Comparison], Searcher],
     report: Callable[[str], Callable[[float], None]],
 ) -> tuple[Searcher, Naming]:
     """The explanation of a recording, and the search that found it.
 
     Where it holds a motion of the platform that makes another wind at the sensors, it is the
     explanation of the recording seen in that wind.
+
+    Args:
+        comparison: The recording.
+        search: Prepares the search of a comparison.
+        report: Gives a phase's progress function.
     """
-    searcher = _searcher(comparison, baseline, effects, workers, report)
+    searcher = search(comparison)
     first = first_round(searcher)
 
     def seen_moving(terms: Sequence[Term]) -> tuple[Searcher, Naming] | None:
         moved = _moving(comparison, terms)
         if moved is None:
             return None
-        again = _searcher(moved, baseline, effects, workers, report)
+        again = search(moved)
         naming = name(again, first_round(again), report("fitting effects"))
         return (again, naming) if _motion(naming.fit.terms) else None
 
@@ -100,23 +103,6 @@ def _explained(
     if _motion(naming.fit.terms) != _motion(first.terms):
         found = seen_moving(naming.fit.terms)
     return found or (searcher, naming)
-
-
-def _searcher(
-    comparison: Comparison,
-    baseline: Baseline,
-    effects: Mapping[str, Effect],
-    workers: int,
-    report: Callable[[str], Callable[[float], None]],
-) -> Searcher:
-    guesses = {
-        key: terms
-        for key, terms in guesses_of(comparison, baseline.station).items()
-        if key[0] in effects
-    }
-    return searcher_of(
-        comparison, baseline, effects, guesses, workers, report("simulating the catalogue")
-    )
 
 
 def _motion(terms: Sequence[Term]) -> list[Term]:
@@ -172,15 +158,26 @@ def diagnose(
     comparison = prepare(recording, baseline.station, baseline.place)
     if is_calm(comparison):
         baseline = baseline.in_calm()
-    searcher, naming = _explained(comparison, baseline, known, workers, report)
+
+    def search(seen: Comparison) -> Searcher:
+        guesses = {
+            key: terms
+            for key, terms in guesses_of(seen, baseline.station).items()
+            if key[0] in known
+        }
+        return searcher_of(
+            seen, baseline, known, guesses, workers, report("simulating the catalogue")
+        )
+
+    searcher, naming = _explained(comparison, search, report)
     comparison = searcher.comparison
     if naming.fit.terms:
         rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
         follows = comparison.where_vanes_follow(rivals)
         if comparison.misfit_outside(follows, naming.fit.simulated) > TURNING_MISFIT:
             before = naming
-            comparison = comparison.within(follows)
-            searcher, naming = _explained(comparison, baseline, known, workers, report)
+            searcher, naming = _explained(comparison.within(follows), search, report)
+            comparison = searcher.comparison
             naming = kept_if_better(searcher, before, naming)
     judged = judgement_of(searcher, naming, baseline, workers, report, with_proof)
     if not judged.is_claim:
