@@ -191,7 +191,7 @@ def wind_heading_from_motion(
         density_ratio: Air density relative to the calibration's.
     """
     omega = max(speed, 0.3) / p.distance_constant
-    stiffness = density_ratio / p.inertia_factor
+    stiffness = density_ratio / (1.0 + p.softness * speed * speed) / p.inertia_factor
     other = 2.0 * p.damping_ratio * p.damping_factor * stiffness * omega * (rate + yaw_rate)
     if p.imbalance != 0.0:
         across = -pull[0] * math.sin(phi) + pull[1] * math.cos(phi)

@@ -291,6 +291,8 @@ class Vane(Angle):
     """That heading, counter-clockwise from the sensor's x axis."""
     catch_width_deg: Positive = 5.0
     """Standard width of the place."""
+    fin_yield_speed: NonNegative = 0.0
+    """Wind in which the fin, bent away, holds by half the force of a stiff one [m/s]; 0: stiff."""
 
 
 class Bivane(Angle):

@@ -97,4 +97,5 @@ def vane_parameters(vane: Angle) -> VaneParameters:
         catch=vane.catch_speed**2,
         catch_heading=float(np.radians(vane.catch_heading_deg)),
         catch_width=float(np.radians(vane.catch_width_deg)),
+        softness=vane.fin_yield_speed**-2 if vane.fin_yield_speed > 0.0 else 0.0,
     )

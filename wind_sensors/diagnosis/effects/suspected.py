@@ -110,5 +110,30 @@ CATCH = Effect(
     },
 )
 
-SUSPECTS = (PLAY, SLEW_LIMIT, CATCH)
+
+def _soft_fin(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Vane)
+    return {"fin_yield_speed": values["yield_speed"]}
+
+
+SOFT_FIN = Effect(
+    name="soft_fin",
+    meaning="a fin that gives way to the wind",
+    entrance="response",
+    equation="stiffness and damping / (1 + U^2/U_y^2)",
+    source="deflection of an elastic fin under the dynamic pressure, first order",
+    region="near the vane's resonance in strong wind; in weak wind nothing",
+    parameters=(Parameter("yield_speed", "m/s", 1.5, 40.0, healthy=None, step=0.2),),
+    applies=_turns_about_the_vertical,
+    update=_soft_fin,
+    smooths=True,
+    templates=({"yield_speed": 4.0}, {"yield_speed": 8.0}, {"yield_speed": 15.0}),
+    confusable={
+        "vane_inertia": "a release test in weak wind and in strong wind",
+        "vane_damping": "a release test in weak wind and in strong wind",
+        "low_pass_filter": "bend the fin by hand; a release test in weak wind",
+    },
+)
+
+SUSPECTS = (PLAY, SLEW_LIMIT, CATCH, SOFT_FIN)
 """All of them, in the order in which they are tried."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.acceptance import (
     is_a_stall,
     may_join,
@@ -24,7 +25,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     seen_in,
     total,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, planted
 from wind_sensors.diagnosis.explaining.guesses import BLIND_IN_PARTS
 from wind_sensors.diagnosis.explaining.leading import (
     held_throughout,
@@ -167,7 +168,8 @@ def _further_fits(
         if eligible(starts)
     ]
     apart = _promising_apart(searcher, current, singles)
-    if not windowed and not apart:
+    hidden = [term for term in _hidden_beside(searcher, whitener, current) if eligible([term])]
+    if not windowed and not apart and not hidden:
         scores = searcher.scores(whitener, current.vector)
         if all(
             s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
@@ -179,8 +181,8 @@ def _further_fits(
         if eligible(starts) and not is_a_stall(searcher, current, starts[0])
     ]
     known = {starts[0].key: starts for starts in candidates}
-    for single in (*sorted(singles, key=total)[:LARGE_CANDIDATES], *apart):
-        (term,) = single.terms
+    large = [*sorted(singles, key=total)[:LARGE_CANDIDATES], *apart]
+    for term in (*(single.terms[0] for single in large), *hidden):
         if term.interval != ALWAYS or not eligible([term]):
             continue
         if term.key in known:
@@ -210,6 +212,58 @@ def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -
     ]
     promising = [(cost, f) for cost, f in own if so_far - cost > WORTH_ANOTHER_TURN]
     return [f for _, f in sorted(promising, key=lambda pair: pair[0])[:LARGE_CANDIDATES]]
+
+
+def _hidden_beside(searcher: Searcher, whitener: Whitener, current: Fit) -> list[Term]:
+    """Effects that smooth the same signals and explain much in the noise that they leave.
+
+    The screening's signatures are those of healthy instruments: what damping does to a vane that
+    sticks is not among them, and what it takes from the noise does not show in theirs.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+    """
+    comparison, station = searcher.comparison, searcher.station
+    reached = {n for t in current.terms for n in comparison.affected(station, t.instrument)}
+    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
+    starts = [
+        start
+        for name, instrument in sorted(possible)
+        if instrument in reached
+        and searcher.effects[name].smooths
+        and searcher.effects[name].entrance != "clock"
+        for start in _sizes_of(searcher.effects[name], instrument)
+        if may_join(start, current.terms)
+    ]
+
+    def promise(start: Term) -> float:
+        terms = [*current.terms, start]
+        simulated = comparison.possible(planted(station, terms))
+        if simulated is None:
+            return -np.inf
+        null = searcher.whitener(simulated, current)
+        return whitener.deviance(current.simulated) - null.deviance(simulated)
+
+    promises = in_parallel(promise, starts, searcher.workers)
+    best: dict[tuple[str, str], tuple[float, Term]] = {}
+    for gain, start in zip(promises, starts, strict=True):
+        if gain > max(WORTH_ANOTHER_TURN, best.get(start.key, (0.0, start))[0]):
+            best[start.key] = (gain, start)
+    ranked = sorted(best.values(), key=lambda pair: -pair[0])
+    return [start for _, start in ranked[:LARGE_CANDIDATES]]
+
+
+def _sizes_of(effect: Effect, instrument: str) -> list[Term]:
+    """An effect in the sizes of its templates, and in those from which its fits start."""
+    starts = [Term(effect, instrument, dict(values)) for values in effect.templates]
+    for parameter in effect.parameters:
+        starts += [
+            Term(effect, instrument, {**effect.templates[0], parameter.name: value})
+            for value in parameter.starts
+        ]
+    return starts
 
 
 def _single_fits(searcher: Searcher, whitener: Whitener) -> list[Fit]:

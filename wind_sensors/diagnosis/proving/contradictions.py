@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
@@ -53,6 +55,15 @@ UNEVEN_SHARE = 0.015
 not drop the cost by more than this, or than this share of the gain (a form that errs by a tenth
 brings a hundredth). What refuses jumps, or sticks and slips in its own way, is taken for a filter
 or for friction otherwise."""
+
+SPEED_TIME = 5.0
+WITH_SPEED = 14.0
+WITH_SPEED_SHARE = 0.02
+WITH_SPEED_EXACT_SHARE = 0.005
+"""An effect has one size in weak wind and in strong wind, which blows within so many seconds: a
+size that grows or shrinks with the speed must not drop the cost by more than the second, or than
+this share of the gain; the last where the form is certain. A fin that gives way is taken for a
+heavy vane otherwise, a cable that pulls for a disc off centre."""
 
 DISCORD = 20.0
 DISCORD_SHARE = 0.02
@@ -190,12 +201,28 @@ def unevenness(naming: Naming, station: Station, term: Term) -> float:
     without = _without(naming, station, term)
     if without is None:
         return 0.0
-    halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
-    for k, channel in enumerate(comparison.channels):
-        lively = _lively(without.series[channel.name], comparison.grid.dt)
-        for half, weight in zip(halves, (1.0 - lively, lively), strict=True):
-            _put(half, naming, without, k, weight)
-    return _drop_by_own_sizes(naming, halves)
+    lively = {
+        c.name: _lively(without.series[c.name], comparison.grid.dt) for c in comparison.channels
+    }
+    return _drop_by_own_sizes(naming, _halves(naming, without, lively))
+
+
+def dependence_on_speed(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if an effect had another size in strong wind than in weak wind.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: One of its effects.
+    """
+    comparison = naming.adequate.comparison
+    without = _without(naming, station, term)
+    if without is None:
+        return 0.0
+    width = round(SPEED_TIME / comparison.grid.dt)
+    strong = _ranks(uniform_filter1d(comparison.speed, width, mode="nearest"))
+    by_channel = dict.fromkeys((c.name for c in comparison.channels), strong)
+    return _drop_by_own_sizes(naming, _halves(naming, without, by_channel))
 
 
 def discord(naming: Naming, station: Station, term: Term) -> float:
@@ -230,6 +257,25 @@ def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:
     return naming.adequate.comparison.possible(planted(station, others))
 
 
+def _halves(
+    naming: Naming, without: Simulated, weights: Mapping[str, FloatArray]
+) -> FloatArray:
+    """What an effect changes, in two parts by weights in time, shape (2, m).
+
+    Args:
+        naming: The explanation.
+        without: The simulation without the effect.
+        weights: From nought to one, of each channel.
+    """
+    comparison = naming.adequate.comparison
+    halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
+    for k, channel in enumerate(comparison.channels):
+        weight = weights[channel.name]
+        for half, part in zip(halves, (1.0 - weight, weight), strict=True):
+            _put(half, naming, without, k, part)
+    return halves
+
+
 def _put(part: FloatArray, naming: Naming, without: Simulated, k: int, weight: FloatArray) -> None:
     """Write what an effect changes on one channel, weighted in time, into a part of it."""
     comparison = naming.adequate.comparison
@@ -258,8 +304,12 @@ def _drop_by_own_sizes(naming: Naming, parts: FloatArray) -> float:
 def _lively(series: FloatArray, dt: float) -> FloatArray:
     """Weights from nought where a series is quiet to one where it is lively, shape (n,)."""
     moving = uniform_filter1d(np.gradient(series) ** 2, round(LIVELY_TIME / dt), mode="nearest")
-    rank = np.argsort(np.argsort(moving)) / max(series.size - 1, 1)
-    return np.asarray(np.clip(2.0 * rank - 0.5, 0.0, 1.0))
+    return np.asarray(np.clip(2.0 * _ranks(moving) - 0.5, 0.0, 1.0))
+
+
+def _ranks(series: FloatArray) -> FloatArray:
+    """From nought at the smallest value to one at the largest, shape (n,)."""
+    return np.asarray(np.argsort(np.argsort(series)) / max(series.size - 1, 1))
 
 
 def is_uneven(naming: Naming, station: Station) -> bool:
@@ -273,3 +323,15 @@ def is_uneven(naming: Naming, station: Station) -> bool:
         for term in naming.fit.terms
         if not term.effect.exact and not term.effect.legible and not term.is_told
     )
+
+
+def goes_with_speed(naming: Naming, station: Station) -> bool:
+    """Whether an effect has another size in strong wind than in weak wind."""
+    for term in naming.fit.terms:
+        if term.effect.legible or term.is_told:
+            continue
+        share = WITH_SPEED_EXACT_SHARE if term.effect.exact else WITH_SPEED_SHARE
+        most = max(WITH_SPEED, share * naming.gain)
+        if dependence_on_speed(naming, station, term) > most:
+            return True
+    return False

@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.healthy.calibrated_range import (
 )
 from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess_of
 from wind_sensors.diagnosis.proving.contradictions import (
+    goes_with_speed,
     is_discordant,
     is_uneven,
     undo_each_other,
@@ -217,14 +218,16 @@ def _upheld(
         objection = "each would have to undo what the other does"
     elif varies(naming, station):
         objection = "with another size in parts of the record"
+    elif (suspicion := suspicion_of(naming, station, workers)) is not None:
+        left, objection = "unknown", suspicion.words
     elif is_uneven(naming, station):
         objection = "with another size in lively minutes than in quiet ones"
+    elif goes_with_speed(naming, station):
+        objection = "with another size in strong wind than in weak wind"
     elif is_discordant(naming, station):
         objection = "with another size on one signal than on another"
     elif not determined(findings):
         objection = "of any size, nought among them"
-    elif (suspicion := suspicion_of(naming, station, workers)) is not None:
-        left, objection = "unknown", suspicion.words
     else:
         return verdict, findings, ""
     return left, (), f"{names} would fit, but {objection}"

@@ -48,6 +48,8 @@ class VaneParameters(NamedTuple):
     """That heading [rad]."""
     catch_width: float = 1.0
     """Standard width of the place [rad]."""
+    softness: float = 0.0
+    """1/h_y^2 [s^2/m^2]: a fin that bends away holds by 1/(1 + h^2/h_y^2) of a stiff one's."""
 
 
 @compiled
@@ -68,7 +70,8 @@ def vane_acceleration(
     The restoring term is written as h (h sin(phi - alpha)), which needs no direction of the wind.
     """
     h = math.sqrt(wind_x * wind_x + wind_y * wind_y)
-    pace = density_ratio / p.inertia_factor * h / p.distance_constant
+    force = density_ratio / (1.0 + p.softness * h * h)
+    pace = force / p.inertia_factor * h / p.distance_constant
     balanced = phi - p.aerodynamic_offset
     across = wind_y * math.cos(balanced) - wind_x * math.sin(balanced)
     restoring = pace * across / p.distance_constant
