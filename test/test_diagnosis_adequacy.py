@@ -380,6 +380,18 @@ def test_what_is_drawn_at_random_differs_from_block_to_block(
     assert borne_out((replace(found, proof=proof),)) is borne
 
 
+@pytest.mark.parametrize(
+    ("stuck", "damped", "together", "made"),
+    [(1700.0, 200.0, 1050.0, False), (900.0, 800.0, 1050.0, True), (700.0, 400.0, 1050.0, False)],
+)
+def test_what_takes_back_a_part_of_the_other_is_real_if_that_one_shows_alone(
+    stuck: float, damped: float, together: float, made: bool
+) -> None:
+    friction = replace(_finding("vane_friction", "vane", 0.9, 0.002), gain=stuck)
+    damping = replace(_finding("vane_damping", "vane", 0.2, 0.002), gain=damped)
+    assert made_up((friction, damping), prepare(recorded(STATION, 65)), together) is made
+
+
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
     rival = replace(_finding(*ASYMMETRY, 0.9, 0.5), proof=None)
     found = (_finding(*OFFSET, 0.9, 0.002), rival)

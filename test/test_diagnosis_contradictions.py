@@ -4,21 +4,29 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, evidence, no_terms
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, fit
 from wind_sensors.diagnosis.explaining.leading import held_throughout
 from wind_sensors.diagnosis.explaining.moves import looked_around
+from wind_sensors.diagnosis.explaining.rounds import best_beside
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.healthy.whitening import Whitener
-from wind_sensors.diagnosis.proving.contradictions import is_discordant, varies
+from wind_sensors.diagnosis.proving.contradictions import (
+    goes_with_speed,
+    is_discordant,
+    varies,
+)
 from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
+from wind_sensors.station.signals import Angles
 
 
 def searched(
@@ -55,6 +63,41 @@ def test_thin_air_shows_on_the_vane_as_well(
     assert naming.gain > 40.0
     assert naming.fit.terms[0].values["density_ratio"] < 0.75
     assert is_discordant(naming, STATION) is discordant
+
+
+@pytest.mark.parametrize("with_speed", [False, True])
+def test_an_offset_is_the_same_in_strong_wind(with_speed: bool) -> None:
+    recording = recorded(STATION, 73)
+    assert recording.reference is not None
+    speed = np.hypot(*recording.reference.velocity[:, :2].T)
+    pressure = uniform_filter1d((speed / speed.mean()) ** 2, 100)
+    shift = np.radians(8.0) * (pressure if with_speed else 1.0)
+    readings = recording.angles["vane"]
+    turned = Angles(readings.time, np.angle(np.exp(1j * (readings.angle + shift))))
+    shown = replace(recording, angles={"vane": turned})
+    searcher = searcher_of(prepare(shown), baseline(), catalogue(), {})
+    offset = Term(catalogue()["vane_offset"], "vane", {"offset": 8.0})
+    naming = named(searcher, searcher.whitener(searcher.bank.without), offset)
+    assert goes_with_speed(naming, STATION) is with_speed
+
+
+@pytest.mark.parametrize("damping", [2.5, 1.0])
+def test_what_damps_a_vane_that_sticks_is_found_in_the_noise_that_it_leaves(
+    damping: float,
+) -> None:
+    sticking = {"friction_speed": 2.0, "damping_factor": damping}
+    recording = replace(recorded(with_keys(STATION, "vane", sticking), 75), station=STATION)
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
+    stuck = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
+    first = fit(searcher.whitener(searcher.bank.without), STATION, [stuck])
+    found = best_beside(searcher, first, [], frozenset())
+    if damping == 1.0:
+        assert found is None
+        return
+    assert found is not None
+    damped = found[0].fit.terms[-1]
+    assert damped.key == ("vane_damping", "vane")
+    assert damped.values["damping_factor"] == pytest.approx(damping, rel=0.2)
 
 
 @pytest.mark.parametrize(

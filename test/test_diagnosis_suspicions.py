@@ -64,6 +64,18 @@ def test_a_bearing_that_catches_all_the_time_is_no_friction_that_begins() -> Non
     assert suspicion.fault.interval == ALWAYS
 
 
+def test_a_fin_that_gives_way_is_no_heavy_vane() -> None:
+    soft = with_keys(STATION, "vane", {"fin_yield_speed": 6.0})
+    naming = diagnose(recorded(soft, 68, mean=6.0), baseline(), with_proof=False).naming
+    heavy = Term(catalogue()["vane_inertia"], "vane", {"inertia_factor": 2.0})
+    fitted = fit(naming.whitener, STATION, [heavy])
+    suspicion = suspicion_of(replace(naming, fit=fitted), STATION)
+    assert suspicion is not None
+    assert suspicion.fault.key == ("soft_fin", "vane")
+    assert suspicion.fault.values["yield_speed"] == pytest.approx(6.0, rel=0.25)
+    assert "gives way" in suspicion.words
+
+
 def test_friction_keeps_its_name_beside_them() -> None:
     found = diagnosed("vane_friction", "vane", friction_speed=2.5)
     assert suspicion_of(found.naming, STATION) is None

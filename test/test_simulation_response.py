@@ -153,6 +153,25 @@ def test_a_bearing_that_catches_holds_the_vane_at_one_heading_only():
     assert np.abs(behind[far]).max() < 0.1
 
 
+def test_a_fin_that_gives_way_swings_more_slowly_in_strong_wind_only():
+    """Against the period of a free swing, 2 pi l_v / U, and half the force at the yield speed."""
+    periods = {}
+    for speed in (2.0, 10.0):
+        wind = np.tile([-speed, 0.0, 0.0], (4000, 1))
+        wind[:200, 1] = 0.2 * speed
+        drive = Drive(START, 0.005, wind)
+        for fin, soft in (("stiff", {}), ("soft", {"fin_yield_speed": 10.0})):
+            swinging = vane(damping_ratio=0.02, **soft)
+            angle = respond(Station(instruments=(swinging,)), drive).angles["vane"].angle[200:]
+            crossings = np.flatnonzero((angle[:-1] > 0.0) != (angle[1:] > 0.0))
+            periods[fin, speed] = 2.0 * 0.005 * np.mean(np.diff(crossings))
+        expected = 2.0 * np.pi * vane().distance_constant / speed
+        assert periods["stiff", speed] == pytest.approx(expected, rel=0.03)
+        share = 1.0 / (1.0 + (speed / 10.0) ** 2)
+        slower = periods["soft", speed] / periods["stiff", speed]
+        assert slower == pytest.approx(share**-0.5, rel=0.02)
+
+
 def test_finer_sampling_of_the_same_wind_gives_the_same_movement():
     coarse = gusty(count=800)
     fine_time = np.arange(799 * 8 + 1) * coarse.dt / 8

@@ -116,6 +116,7 @@ def excess_of(
             continue
         known = baseline.channels[channel.name]
         seen, count = levels(comparison, simulated, known, channel)
+        count = count * (1.0 if comparison.mask is None else float(np.mean(comparison.mask)))
         above = seen - known.noise_mean
         scores = above / np.sqrt(known.noise_deviation**2 + 2.0 / np.maximum(count, 1.0))
         usable = np.isfinite(scores) & np.isfinite(known.noise_deviation)

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.detectable import smallest_detectable
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import (
@@ -50,6 +53,9 @@ from wind_sensors.diagnosis.proving.support import (
 from wind_sensors.diagnosis.proving.suspicions import suspicion_of
 from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.station.model import Station
+
+LEAST_JUDGED = 0.1
+"""Share of the record that what passes must hold for its minutes' noise to be judged."""
 
 REPEATED = 0.01
 """With more of the reference's samples repeating those before them, something is wrong with it."""
@@ -179,12 +185,24 @@ def judgement_of(
 
 
 def _noise_left(naming: Naming, baseline: Baseline) -> Excess:
-    """How far the residual's noise exceeds that of healthy days, where that can be judged."""
+    """How far the residual's noise exceeds that of healthy days, where that can be judged.
+
+    In the whole record, and in the minutes in which something that passes is said to hold.
+    """
     apart = unstirred(naming, baseline.station)
     if apart is None:
         return Excess()
-    simulated = apart.simulate(planted(baseline.station, naming.fit.terms))
-    return excess_of(apart, simulated, baseline, with_own_noise(naming))
+    corrected = planted(baseline.station, naming.fit.terms)
+    seconds = apart.grid.centres + apart.drive.elapsed
+    views = [apart]
+    for term in naming.fit.terms:
+        begin, end = window_of(apart, term.interval)
+        inside = ((seconds > begin) & (seconds < end)).astype(np.float64)
+        if term.interval != ALWAYS and np.mean(apart.masked(inside)) > LEAST_JUDGED:
+            views.append(apart.within(inside))
+    own = with_own_noise(naming)
+    found = [excess_of(view, view.simulate(corrected), baseline, own) for view in views]
+    return max(found, key=lambda excess: excess.score)
 
 
 def _upheld(

@@ -21,8 +21,10 @@ NOISE_LEFT = 1.1
 more is left than so many times the noise of a healthy day."""
 
 MOST_SHARED = 1.5
+MOST_ALONE = 0.75
 """Largest sum of what two effects on the same signals bring, each in the other's presence, over
-what they bring together."""
+what they bring together, unless one of them brings the second share of that alone: beside friction
+that makes a vane jump, damping that calms it is no help to either."""
 
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
@@ -66,8 +68,11 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
         sure = f.gain > (SURE_GAIN if alone else SURE_BESIDE_GAIN)
         if f.p > SHOWN_P and f.share < OWN_SHARE and not sure:
             return True
-    together = bool(set.intersection(*reached))
-    return together and sum(f.gain for f in own) > MOST_SHARED * gain
+    if not set.intersection(*reached):
+        return False
+    brought = sum(f.gain for f in own)
+    single = max(gain - (brought - f.gain) for f in own)
+    return brought > MOST_SHARED * gain and single < MOST_ALONE * gain
 
 
 def passes_unseen(findings: tuple[Finding, ...]) -> bool:
