@@ -12,7 +12,7 @@ from proving_ground.generate import Planted, RecordingSpec, healthy, with_effect
 from proving_ground.minimum_sizes import MINIMUM_SIZES, applicable
 from proving_ground.stations import Station, random_station
 
-SIZES = (0.5, 1.0, 1.5, 2.0, 3.0, 6.0)
+SIZES = (0.5, 1.0, 1.5, 3.0, 6.0, 12.0)
 SHARES = {
     "healthy": 0.22,
     "single": 0.36,

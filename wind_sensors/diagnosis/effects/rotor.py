@@ -131,7 +131,10 @@ AIR_DENSITY = Effect(
     region="with temperature and pressure; response length and low speeds",
     smooths=True,
     parameters=(
-        Parameter("density_ratio", "1", 0.3, 2.5, healthy=1.0, minimum=0.1, step=0.04),
+        Parameter(
+            "density_ratio", "1", 0.2, 2.5, healthy=1.0, minimum=0.1, step=0.04,
+            starts=(0.4, 0.6, 0.8, 1.25, 1.6),
+        ),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_density,
@@ -161,7 +164,7 @@ ROTOR_INERTIA = Effect(
     parameters=(
         Parameter(
             "inertia_factor", "1", 0.2, 12.0, healthy=1.0, minimum=0.3, step=0.1,
-            starts=(1.5, 3.0),
+            starts=(1.5, 3.0, 6.0),
         ),
     ),
     applies=_is_rotor,
@@ -277,7 +280,8 @@ ICING = Effect(
     parameters=(
         Parameter("gain", "1", 0.2, 1.0, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(
-            "inertia_factor", "1", 0.8, 12.0, healthy=1.0, minimum=0.4, step=0.1, starts=(1.5,)
+            "inertia_factor", "1", 0.8, 12.0, healthy=1.0, minimum=0.4, step=0.1,
+            starts=(1.5, 3.0),
         ),
     ),
     applies=_is_rotor,

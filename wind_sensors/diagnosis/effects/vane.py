@@ -63,7 +63,7 @@ VANE_INERTIA = Effect(
     parameters=(
         Parameter(
             "inertia_factor", "1", 0.2, 20.0, healthy=1.0, minimum=0.4, step=0.1,
-            starts=(2.0, 4.0),
+            starts=(2.0, 4.0, 8.0),
         ),
     ),
     applies=is_vane,
@@ -298,7 +298,7 @@ LOW_PASS_FILTER = Effect(
     region="high frequencies, the same at all wind speeds",
     smooths=True,
     parameters=(
-        Parameter("time_constant", "s", 0.0, 20.0, minimum=0.1, step=0.05, starts=(0.3, 1.0)),
+        Parameter("time_constant", "s", 0.0, 20.0, minimum=0.1, step=0.05, starts=(0.3, 1.0, 3.0)),
     ),
     applies=is_vane,
     update=_low_pass,

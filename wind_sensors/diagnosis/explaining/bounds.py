@@ -1,11 +1,11 @@
-"""Fits that ran into the bounds of a parameter."""
+"""Parameters that ran into their bounds, and those that a recording does not ask for."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from wind_sensors.diagnosis.effects.definition import Parameter
-from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.fitting import Fit, Term
 
 _MARGIN = 0.02
 """A value is at a bound within this share of the bounds' distance."""
@@ -52,3 +52,29 @@ def without_run_aways(term: Term) -> Term | None:
     if not gone or term.effect.contains or len(tied) < len(gone) or len(tied) == len(graded):
         return None
     return replace(term, values={**term.values, **tied}, held=term.held | gone)
+
+
+def without_idle(found: Fit, price: float) -> Term | None:
+    """The newest term with what does not pay for itself held at its healthy value; None: all does.
+
+    Only what goes with another quantity (grease that stiffens in the cold): without it the effect
+    is the same one, only simpler.
+
+    Args:
+        found: A fit.
+        price: What a further parameter costs.
+    """
+    term = found.terms[-1]
+    parameters = term.effect.parameters
+    variances = found.covariance.diagonal()[-len(parameters) :]
+    idle = {
+        p.name: p.healthy
+        for p, variance in zip(parameters, variances, strict=True)
+        if p.swing > 0.0
+        and p.healthy is not None
+        and term.fits(p)
+        and (term.values[p.name] - p.healthy) ** 2 < price * variance
+    }
+    if not idle:
+        return None
+    return replace(term, values={**term.values, **idle}, held=term.held | frozenset(idle))

@@ -39,7 +39,7 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
-LARGE_CANDIDATES = 3
+LARGE_CANDIDATES = 5
 """So many of the best single effects are tried beside another in the size that they have alone."""
 
 FINALISTS = 7
@@ -181,9 +181,10 @@ def _further_fits(
         if eligible(starts) and not is_a_stall(searcher, current, starts[0])
     ]
     known = {starts[0].key: starts for starts in candidates}
-    large = [*sorted(singles, key=total)[:LARGE_CANDIDATES], *apart]
+    alone = [f for f in singles if f.terms[0].interval == ALWAYS and eligible(f.terms)]
+    large = [*sorted(alone, key=total)[:LARGE_CANDIDATES], *apart]
     for term in (*(single.terms[0] for single in large), *hidden):
-        if term.interval != ALWAYS or not eligible([term]):
+        if not eligible([term]):
             continue
         if term.key in known:
             known[term.key].append(term)

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect
-from wind_sensors.diagnosis.explaining.bounds import without_run_aways
+from wind_sensors.diagnosis.explaining.bounds import without_idle, without_run_aways
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.explaining.screening import (
@@ -271,6 +271,7 @@ class Searcher:
             whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
         )
         tied = without_run_aways(found.terms[-1])
+        tied = tied or without_idle(found, PENALTY_PER_FURTHER_PARAMETER)
         if tied is None:
             return found
         terms = [*found.terms[:-1], tied]
