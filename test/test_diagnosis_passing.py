@@ -18,13 +18,21 @@ from wind_sensors.diagnosis.explaining.explanation import Alternative, Judged, N
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
 from wind_sensors.diagnosis.explaining.moves import merged
-from wind_sensors.diagnosis.explaining.naming import name, named_alone
+from wind_sensors.diagnosis.explaining.naming import kept_if_better, name, named_alone
 from wind_sensors.diagnosis.explaining.rounds import blind_starts, first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
-from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORE, remainder_of, unstirred
+from wind_sensors.diagnosis.proving.decision import (
+    REMAINDER_SCORE,
+    REMAINDER_SCORES,
+    STIRRED_TIMES,
+    carriers_of,
+    remainder_of,
+    unstirred,
+)
 from wind_sensors.diagnosis.proving.findings import equal_explanations
-from wind_sensors.diagnosis.regions import region_bank
+from wind_sensors.diagnosis.regions import Region, region_bank
 from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Series
 
 FloatArray = npt.NDArray[np.float64]
@@ -288,3 +296,73 @@ def test_what_a_signal_shows_that_an_effect_hardly_changes_is_not_held_against_i
     for term, held in ((drift(), False), (turn, True)):
         remainder = remainder_of(named(searcher, term), bank, searcher.comparison, baseline())
         assert (remainder.score > 1.0) is held
+
+
+@pytest.mark.parametrize("carried", [True, False])
+def test_what_is_left_on_the_vane_that_carries_a_propeller_speaks_against_its_name(
+    searcher: Searcher, carried: bool
+) -> None:
+    propeller = {
+        "name": "propeller", "kind": "propeller", "pulses": {"topic": "/propeller/pulses"},
+        "pulses_per_revolution": 6, "calibration_distance": 0.05, "distance_constant": 2.7,
+        "mounted_on": "vane" if carried else "", "axis": None if carried else (-1.0, 0.0, 0.0),
+    }  # fmt: skip
+    station = Station.model_validate({"instruments": [propeller, STATION.instrument("vane")]})
+    channels = tuple(
+        replace(channel, name=f"{instrument}/{channel.kind}", instrument=instrument)
+        for channel, instrument in zip(
+            searcher.comparison.channels, ("propeller", "vane"), strict=True
+        )
+    )
+    seen = replace(searcher.comparison, station=station, channels=channels)
+    carriers = {"vane/vane_angle"} if carried else set()
+    assert carriers_of(seen, {"propeller/rotor_rate"}) == carriers
+    # What is left on the propeller is nothing against a name of its vane.
+    assert carriers_of(seen, {"vane/vane_angle"}) == set()
+
+
+class _Loud:
+    """Regions with scores that are given."""
+
+    def __init__(self, channel: str, kind: str, score: float) -> None:
+        self.regions = [Region(channel, kind, 0.1, 0.5, "0.1 to 0.5 Hz")]
+        self._score = score
+
+    def scores(self, vector: FloatArray) -> FloatArray:
+        return np.array([self._score])
+
+    def p_value(self, score: float) -> float:
+        return 0.002
+
+
+@pytest.mark.parametrize(
+    ("effect", "kind", "times"),
+    [
+        ("wake_shadow", "frequency", STIRRED_TIMES),
+        ("wake_shadow", "speed", 1.0),
+        ("calibration_drift", "frequency", 1.0),
+    ],
+)
+def test_a_wake_may_leave_some_more_eddies_than_the_simulation_knows(
+    searcher: Searcher, effect: str, kind: str, times: float
+) -> None:
+    comparison = searcher.comparison
+    bearing = float(np.degrees(np.median(comparison.wind_from)))
+    values = {"bearing_from": bearing, "depth": 0.3, "width": 20.0, "flank": 0.0}
+    values = values if effect == "wake_shadow" else {"gain": 1.1}
+    naming = named(searcher, Term(catalogue()[effect], "cup", values))
+    loud = _Loud(comparison.channels[0].name, kind, 300.0)
+    left = remainder_of(naming, loud, comparison, baseline())  # type: ignore[arg-type]
+    assert left.score == pytest.approx(300.0 / REMAINDER_SCORES[kind] / times)
+
+
+def test_what_was_known_before_stays_if_it_fits_clearly_better() -> None:
+    slow = with_effect(STATION, catalogue()["rotor_inertia"], "cup", {"inertia_factor": 3.0})
+    searcher = searcher_of(prepare(recorded(slow, 96)), baseline(), catalogue(), {})
+    heavy = Term(catalogue()["rotor_inertia"], "cup", {"inertia_factor": 3.0})
+    right, wrong = named(searcher, heavy), named(searcher, drift())
+    kept = kept_if_better(searcher, right, wrong)
+    assert [t.key for t in kept.fit.terms] == [heavy.key]
+    # Nor does what is no better come back.
+    assert kept_if_better(searcher, wrong, right) is right
+    assert kept_if_better(searcher, right, right) is right

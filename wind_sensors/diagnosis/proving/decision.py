@@ -130,7 +130,7 @@ def remainder_of(
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
         changed = _changed(naming)
-        channels = changed | _carriers(comparison, changed)
+        channels = changed | carriers_of(comparison, changed)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
         own = [stirred and r.kind in STIRRED_KINDS for r in bank.regions]
         outside = [_is_outside(r, naming) for r in bank.regions]
@@ -151,7 +151,7 @@ def _changed(naming: Naming) -> set[str]:
     return {c.name for c, moved in zip(comparison.channels, squares, strict=True) if moved > least}
 
 
-def _carriers(comparison: Comparison, channels: Collection[str]) -> set[str]:
+def carriers_of(comparison: Comparison, channels: Collection[str]) -> set[str]:
     """Channels of the vanes that carry the propellers of some channels."""
     carried = [
         comparison.station.instrument(c.instrument)
