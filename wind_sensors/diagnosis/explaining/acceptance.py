@@ -199,7 +199,8 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
         return 0.0
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf
-    return times_beside(further) * inexact(searcher, whitener, current, longer)
+    own = times_beside(further) * inexact(searcher, whitener, current, longer)
+    return max(own, ACCEPTED_FURTHER_GAIN)
 
 
 def times_beside(further: Term) -> float:
