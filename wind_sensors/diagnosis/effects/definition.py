@@ -96,6 +96,7 @@ class Effect:
             and again.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
             look like that, so a beginning or an end inside the record needs more evidence.
+        shifts: Of those that smooth: it moves the mean of the signal as well.
         exact: Its form is certain (geometry, electronics, arithmetic); what others leave beside
             them may be their own form.
         form_error: Standard error of a size, relative to it, that the simulation's form leaves.
@@ -125,6 +126,7 @@ class Effect:
     contains: frozenset[str] = frozenset()
     occasional: bool = False
     smooths: bool = False
+    shifts: bool = False
     exact: bool = False
     form_error: float = 0.025
     noisy: bool = False
