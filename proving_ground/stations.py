@@ -12,6 +12,9 @@ from proving_ground.fins import FinGeometry
 
 STANDARD_DENSITY = 1.225
 
+LEAST_STEERING = 2.0
+"""In a wind from behind, a fin's torque is at least so many times that of the propeller's drag."""
+
 
 @dataclass(frozen=True)
 class Shaft:
@@ -124,7 +127,7 @@ def random_station(kind: str, seed: int) -> Station:
         fin = vane.geometry._replace(
             propeller_distance=distance, propeller_drag=0.15 * np.pi * rotor.geometry.tip**2
         )
-        vane = replace(vane, geometry=fin)
+        vane = _steered(replace(vane, geometry=fin))
     else:
         rotor = tune_cup(_random_cup(rng), float(rng.uniform(1.2, 4.0)))
     pulses = int(rng.choice([1, 2, 4, 6, 10, 18, 24, 36]))
@@ -210,6 +213,23 @@ def _random_vane(rng: np.random.Generator) -> Vane:
         ),
         Shaft(inertia, 1.3 * friction, friction, 0.0, 0.0),
     )
+
+
+def _steered(vane: Vane) -> Vane:
+    """The vane, with a fin that outweighs its propeller even in a wind from behind.
+
+    A rotor in front of the axis would hold a small tail the wrong way round: nobody sells that.
+    """
+    fin = vane.geometry
+    held = fin.propeller_drag * fin.propeller_distance
+    larger = max(1.0, LEAST_STEERING * held / (fin.plate * fin.area * fin.arm))
+    shaft = replace(
+        vane.shaft,
+        inertia=larger * vane.shaft.inertia,
+        static=larger * vane.shaft.static,
+        coulomb=larger * vane.shaft.coulomb,
+    )
+    return replace(vane, geometry=fin._replace(area=larger * fin.area), shaft=shaft)
 
 
 def _random_cup(rng: np.random.Generator) -> CupRotor:

@@ -8,14 +8,19 @@ import numpy as np
 import pytest
 from test_diagnosis_naming import STATION, recorded
 
+from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.explaining.acceptance import needed_gain
+from wind_sensors.diagnosis.explaining.fitting import Fit, Term
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.explaining.signatures import Template, templates_of
+from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.diagnosis.healthy.reference_lag import lag_weights
 from wind_sensors.diagnosis.healthy.standing import Evidence, loudest_gains
 
+NOTHING = Fit((), 0.0, np.zeros(0), Simulated({}, {}, {}, {}, np.zeros(0)), np.zeros((0, 0)), 0)
 QUIET, LOUD = 0.0, 60.0
 POWER = 100.0
 
@@ -52,6 +57,28 @@ def test_a_calm_day_is_no_measure_of_windy_ones_unless_there_are_few() -> None:
     assert loudest_gains(rows)["vane"] > 20.0
     assert loudest_gains(rows, calm).get("vane", 0.0) < 1.0
     assert loudest_gains(rows[1:], calm[1:])["vane"] > 20.0
+
+
+@pytest.mark.parametrize(
+    ("effect", "quick"),
+    [("vane_offset", False), ("low_pass_filter", True), ("timestamp_latency", True)],
+)
+def test_a_days_offset_does_not_raise_what_a_filter_must_bring(effect: str, quick: bool) -> None:
+    rows = days(effect, "vane", 1.0, 0.0)
+    loudest, of_quick = loudest_gains(rows), loudest_gains(rows, quick=True)
+    assert loudest["vane"] > 20.0
+    assert of_quick == (loudest if quick else {})
+    known = replace(
+        default_baseline(STATION), loudest=loudest, loudest_quick=of_quick,
+        recordings=("a", "b", "c"),
+    )  # fmt: skip
+    assert Baseline.from_json(known.to_json()).loudest_quick == of_quick
+    needs = {
+        name: needed_gain(NOTHING, Term(catalogue()[name], "vane", {}), known)
+        for name in ("vane_offset", "vane_inertia")
+    }
+    assert needs["vane_offset"] == pytest.approx(1.2 * loudest["vane"])
+    assert (needs["vane_inertia"] == needs["vane_offset"]) is quick
 
 
 @pytest.mark.parametrize("effect", ["low_pass_filter", "wake_shadow"])

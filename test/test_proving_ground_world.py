@@ -14,6 +14,7 @@ from proving_ground.concealed.registry import CATALOGUED, cause
 from proving_ground.concealed.rotor import drag_for_loss
 from proving_ground.concealed.strangers import STRANGERS
 from proving_ground.development_set import station_plan
+from proving_ground.drive import SUBSTEPS, turn_vane
 from proving_ground.generate import Planted, generate_recording, healthy, with_effect
 from proving_ground.inflow import make_eddies
 from proving_ground.measure import Signals, run_scene
@@ -21,8 +22,10 @@ from proving_ground.minimum_sizes import MINIMUM_SIZES, applicable
 from proving_ground.scene import build_scene
 from proving_ground.stations import CupRotor, Shaft, Station, random_station
 from proving_ground.tunnel import (
+    STEP,
     cup_path,
     cup_tracks,
+    fin_tracks,
     rotor_sheet,
     steady_rate,
     uniform_flow,
@@ -111,6 +114,19 @@ def test_the_vane_swings_as_thin_fin_theory_says_for_small_angles(
     sheet = vane_sheet(vane)
     assert sheet.distance_constant == pytest.approx(distance, rel=0.1)
     assert sheet.damping_ratio == pytest.approx(fin.arm / (2.0 * distance), rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [7, 10_000, 10_031, 10_042])
+def test_no_propeller_holds_its_vane_the_wrong_way_round(seed: int) -> None:
+    vane = random_station("C", seed).vane
+    flow = uniform_flow(5.0, 0.0, 20.0)
+    # Blown at from behind, eight degrees off; a wind from the west is headed at pi.
+    path = turn_vane(
+        flow, vane.geometry, fin_tracks(vane.shaft, len(flow)), np.radians(8.0), 0.0, STEP, SUBSTEPS
+    )
+    away = np.abs(np.angle(np.exp(1j * (path - np.pi))))
+    assert away[0] > np.radians(170.0)
+    assert away[-1] < np.radians(5.0)
 
 
 def test_friction_planted_for_a_loss_gives_that_loss(stations: dict[str, Station]) -> None:

@@ -158,6 +158,11 @@ class Effect:
                 out[p.name] = min(max(moved, p.low), p.high)
         return out
 
+    @property
+    def is_quick(self) -> bool:
+        """Whether it only damps, hastens or delays what the wind does, and moves no mean."""
+        return (self.smooths or self.entrance == "clock") and not self.shifts
+
     def relative_size(self, values: Values) -> float:
         """Size of the effect in units of the smallest size worth reporting."""
         if self.size is not None:

@@ -187,6 +187,7 @@ TORQUE_ASYMMETRY = Effect(
     source="K94, eqs. (1), (2); K14, eq. (76)",
     region="mean speed and skewness in strong turbulence",
     smooths=True,
+    shifts=True,
     parameters=(
         Parameter("a4", "1", 0.05, 2.9, healthy=1.0, minimum=0.4, step=0.1, starts=(2.0,)),
     ),
@@ -277,6 +278,7 @@ ICING = Effect(
     contains=frozenset({"calibration_drift", "rotor_inertia"}),
     standing=0.0,
     smooths=True,
+    shifts=True,
     parameters=(
         Parameter("gain", "1", 0.2, 1.0, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(

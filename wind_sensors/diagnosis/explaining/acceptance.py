@@ -112,7 +112,8 @@ def needed_gain(current: Fit, further: Term, baseline: Baseline) -> float:
         baseline: Knows how loud healthy days are.
     """
     least = ACCEPTED_ELSEWHERE_GAIN if current.terms else ACCEPTED_GAIN
-    return max(least, LOUDEST_FACTOR * baseline.loudness(further.instrument))
+    loudness = baseline.loudness(further.instrument, further.effect.is_quick)
+    return max(least, LOUDEST_FACTOR * loudness)
 
 
 def passing_gain(term: Term, beside: bool = False) -> float:

@@ -153,6 +153,7 @@ class Baseline:
             (or of the `station`, the `platform`) promises in one healthy recording judged by the
             others; calm ones aside.
         loudest_in_calm: The same, calm ones among them.
+        loudest_quick, loudest_quick_in_calm: The same of effects that only damp, hasten or delay.
         liveliness: Standard deviation of the slowest change, over a recording, of the power of
             quick eddies (its logarithm) that all channels share.
         usual_wind: Wind speed [m/s] that healthy recordings exceed nearly all the time.
@@ -167,6 +168,8 @@ class Baseline:
     standing: Mapping[str, float] = field(default_factory=dict)
     loudest: Mapping[str, float] = field(default_factory=dict)
     loudest_in_calm: Mapping[str, float] = field(default_factory=dict)
+    loudest_quick: Mapping[str, float] = field(default_factory=dict)
+    loudest_quick_in_calm: Mapping[str, float] = field(default_factory=dict)
     liveliness: float = activity.USUAL_LIVELINESS
     usual_wind: float = np.inf
     place: Place | None = None
@@ -176,18 +179,26 @@ class Baseline:
         """Whether healthy recordings stand behind it."""
         return bool(self.recordings)
 
-    def loudness(self, instrument: str) -> float:
+    def loudness(self, instrument: str, quick: bool = False) -> float:
         """What an effect of an instrument promises on the loudest healthy day.
 
         A few days show little of each instrument: what they show of others stands in, in part.
+
+        Args:
+            instrument: Name, or `station`, or `platform`.
+            quick: Of an effect that only damps, hastens or delays: a vane that reads half a degree
+                more on one day and less on another does not look like one that is filtered.
         """
+        loudest = self.loudest_quick if quick else self.loudest
         elsewhere = min(1.0, FEW_DAYS / max(len(self.recordings), 1))
-        overall = max(self.loudest.values(), default=0.0)
-        return max(self.loudest.get(instrument, 0.0), elsewhere * overall)
+        overall = max(loudest.values(), default=0.0)
+        return max(loudest.get(instrument, 0.0), elsewhere * overall)
 
     def in_calm(self) -> Baseline:
         """The same baseline for a recording of a calm day."""
-        return replace(self, loudest=self.loudest_in_calm)
+        return replace(
+            self, loudest=self.loudest_in_calm, loudest_quick=self.loudest_quick_in_calm
+        )
 
     def for_station(self, station: Station) -> Baseline:
         """The same baseline for a recording whose station file may say otherwise.
@@ -229,6 +240,8 @@ class Baseline:
             "standing": dict(self.standing),
             "loudest": dict(self.loudest),
             "loudest_in_calm": dict(self.loudest_in_calm),
+            "loudest_quick": dict(self.loudest_quick),
+            "loudest_quick_in_calm": dict(self.loudest_quick_in_calm),
             "liveliness": self.liveliness,
             "usual_wind": _listed(np.array([self.usual_wind]))[0],
             "place": None if self.place is None else asdict(self.place),
@@ -244,6 +257,7 @@ class Baseline:
         """
         content = json.loads(text)
         try:
+            in_calm = content.get("loudest_in_calm", content["loudest"])
             known = Baseline(
                 recordings=tuple(content["recordings"]),
                 original=Station.model_validate(content["original"]),
@@ -255,7 +269,9 @@ class Baseline:
                 means=content["means"],
                 standing=content["standing"],
                 loudest=content["loudest"],
-                loudest_in_calm=content.get("loudest_in_calm", content["loudest"]),
+                loudest_in_calm=in_calm,
+                loudest_quick=content.get("loudest_quick", content["loudest"]),
+                loudest_quick_in_calm=content.get("loudest_quick_in_calm", in_calm),
                 liveliness=content.get("liveliness", activity.USUAL_LIVELINESS),
                 usual_wind=float(_unlisted([content["usual_wind"]])[0]),
                 place=None if content.get("place") is None else Place(**content["place"]),

@@ -167,13 +167,14 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
 
 
 def loudest_gains(
-    rows: Sequence[Evidence], calm: Sequence[bool] | None = None
+    rows: Sequence[Evidence], calm: Sequence[bool] | None = None, quick: bool = False
 ) -> dict[str, float]:
     """Largest gains that effects promise in a healthy recording judged by the others.
 
     Args:
         rows: Of each healthy recording.
         calm: Which of them say nothing of a windy day; None, or too few others: none.
+        quick: Of effects that only damp, hasten or delay; a day's offset is none of these.
 
     Returns:
         By instrument (or `station`, `platform`), drop of the cost beyond what the parameters cost;
@@ -200,6 +201,8 @@ def loudest_gains(
         gram = row.gram - part.T @ inner
         seen = seen - inner.T @ (usual @ seen[: len(own)])
         for score in filter(is_possible, scores_of(row.probes, gram, seen)):
+            if quick and not score.template.effect.is_quick:
+                continue
             parameters = len(score.template.effect.parameters)
             cost = PENALTY_PER_PARAMETER + PENALTY_PER_FURTHER_PARAMETER * (parameters - 1)
             before = loudest.get(score.instrument, 0.0)
