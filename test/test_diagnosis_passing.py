@@ -366,3 +366,8 @@ def test_what_was_known_before_stays_if_it_fits_clearly_better() -> None:
     # Nor does what is no better come back.
     assert kept_if_better(searcher, wrong, right) is right
     assert kept_if_better(searcher, right, right) is right
+    # The second search may find nothing.
+    nothing = replace(right, fit=no_terms(right.whitener, searcher), gain=0.0)
+    kept = kept_if_better(searcher, right, nothing)
+    assert [t.key for t in kept.fit.terms] == [heavy.key]
+    assert kept_if_better(searcher, wrong, nothing) is nothing

@@ -308,6 +308,9 @@ def fit(
         known: Fit of the same effects, or of the first ones, near the same values, in whatever
             null, from which the derivatives are carried along.
         least: Drop of the cost that is worth another step, beside a share of the cost.
+
+    Returns:
+        The fit; without terms, what there is without any effect.
     """
     problem = Problem(whitener, station, terms, rest)
     parameters = [p for _, p in _parameters(terms)]
@@ -321,6 +324,8 @@ def fit(
         vector, first = problem.vector(values)
         cost = float(vector @ vector)
     simulated = first
+    if not parameters:
+        return Fit(tuple(terms), cost, vector, simulated, np.zeros((0, 0)), problem.evaluations)
     damping = 1e-2
     slopes = None
     if known is not None and known.slopes is not None:
