@@ -110,7 +110,10 @@ def residual_figure(
         over_time.plot(cut, _smooth(before, smoothed), color=style.RAW, label="before")
         if corrected is not None:
             over_time.plot(cut, _smooth(after, smoothed), color=style.CORRECTED, label="with it")
-            over_time.legend(loc="upper right", ncols=2)
+            if stacked:
+                over_time.legend(loc="upper right", ncols=2)
+            else:
+                over_time.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))
         over_time.axhline(0.0, color=style.MUTED, linewidth=0.8)
         over_time.set_title(
             title_for(width, f"Recorded minus simulated, {channel_words(channel.name)}")
