@@ -30,7 +30,7 @@ from wind_sensors.diagnosis.proving.decision import (
     unstirred,
 )
 from wind_sensors.diagnosis.proving.findings import equal_explanations
-from wind_sensors.diagnosis.regions import Region, region_bank
+from wind_sensors.diagnosis.regions import Region, RegionBank, region_bank
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Series
@@ -321,18 +321,11 @@ def test_what_is_left_on_the_vane_that_carries_a_propeller_speaks_against_its_na
     assert carriers_of(seen, {"vane/vane_angle"}) == set()
 
 
-class _Loud:
-    """Regions with scores that are given."""
-
-    def __init__(self, channel: str, kind: str, score: float) -> None:
-        self.regions = [Region(channel, kind, 0.1, 0.5, "0.1 to 0.5 Hz")]
-        self._score = score
+class _Loud(RegionBank):
+    """One region whose score is given."""
 
     def scores(self, vector: FloatArray) -> FloatArray:
-        return np.array([self._score])
-
-    def p_value(self, score: float) -> float:
-        return 0.002
+        return np.array([300.0])
 
 
 @pytest.mark.parametrize(
@@ -351,8 +344,9 @@ def test_a_wake_may_leave_some_more_eddies_than_the_simulation_knows(
     values = {"bearing_from": bearing, "depth": 0.3, "width": 20.0, "flank": 0.0}
     values = values if effect == "wake_shadow" else {"gain": 1.1}
     naming = named(searcher, Term(catalogue()[effect], "cup", values))
-    loud = _Loud(comparison.channels[0].name, kind, 300.0)
-    left = remainder_of(naming, loud, comparison, baseline())  # type: ignore[arg-type]
+    region = Region(comparison.channels[0].name, kind, 0.1, 0.5, "0.1 to 0.5 Hz")
+    loud = _Loud((region,), np.zeros((0, 0)), (), (), np.zeros(0))
+    left = remainder_of(naming, loud, comparison, baseline())
     assert left.score == pytest.approx(300.0 / REMAINDER_SCORES[kind] / times)
 
 

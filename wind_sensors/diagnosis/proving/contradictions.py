@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -197,14 +197,10 @@ def unevenness(naming: Naming, station: Station, term: Term) -> float:
         station: As commissioned.
         term: One of its effects.
     """
-    comparison = naming.adequate.comparison
-    without = _without(naming, station, term)
-    if without is None:
-        return 0.0
-    lively = {
-        c.name: _lively(without.series[c.name], comparison.grid.dt) for c in comparison.channels
-    }
-    return _drop_by_own_sizes(naming, _halves(naming, without, lively))
+    dt = naming.adequate.comparison.grid.dt
+    return _drop_between_halves(
+        naming, station, term, lambda without, name: _lively(without.series[name], dt)
+    )
 
 
 def dependence_on_speed(naming: Naming, station: Station, term: Term) -> float:
@@ -216,13 +212,9 @@ def dependence_on_speed(naming: Naming, station: Station, term: Term) -> float:
         term: One of its effects.
     """
     comparison = naming.adequate.comparison
-    without = _without(naming, station, term)
-    if without is None:
-        return 0.0
     width = round(SPEED_TIME / comparison.grid.dt)
     strong = _ranks(uniform_filter1d(comparison.speed, width, mode="nearest"))
-    by_channel = dict.fromkeys((c.name for c in comparison.channels), strong)
-    return _drop_by_own_sizes(naming, _halves(naming, without, by_channel))
+    return _drop_between_halves(naming, station, term, lambda without, name: strong)
 
 
 def discord(naming: Naming, station: Station, term: Term) -> float:
@@ -257,23 +249,31 @@ def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:
     return naming.adequate.comparison.possible(planted(station, others))
 
 
-def _halves(
-    naming: Naming, without: Simulated, weights: Mapping[str, FloatArray]
-) -> FloatArray:
-    """What an effect changes, in two parts by weights in time, shape (2, m).
+def _drop_between_halves(
+    naming: Naming,
+    station: Station,
+    term: Term,
+    weight_of: Callable[[Simulated, str], FloatArray],
+) -> float:
+    """Drop of the cost if an effect had a size of its own in each of two parts of the record.
 
     Args:
         naming: The explanation.
-        without: The simulation without the effect.
-        weights: From nought to one, of each channel.
+        station: As commissioned.
+        term: One of its effects.
+        weight_of: Gives, from the simulation without it and a channel's name, how far each instant
+            belongs to the second part, from nought to one.
     """
     comparison = naming.adequate.comparison
+    without = _without(naming, station, term)
+    if without is None:
+        return 0.0
     halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
     for k, channel in enumerate(comparison.channels):
-        weight = weights[channel.name]
+        weight = weight_of(without, channel.name)
         for half, part in zip(halves, (1.0 - weight, weight), strict=True):
             _put(half, naming, without, k, part)
-    return halves
+    return _drop_by_own_sizes(naming, halves)
 
 
 def _put(part: FloatArray, naming: Naming, without: Simulated, k: int, weight: FloatArray) -> None:
