@@ -144,7 +144,9 @@ def brought(
     """
     newest = candidate.fit.terms[-1]
     comparison = searcher.comparison
-    if not plausible(candidate.fit) or is_a_way_of_the_wind(comparison, newest):
+    if not plausible(candidate.fit):
+        return -np.inf
+    if is_a_way_of_the_wind(comparison, newest, current.simulated):
         return -np.inf
     if reads_in_its_gap(comparison, newest):
         return -np.inf
