@@ -304,14 +304,3 @@ def test_the_dose_curve_finds_the_size_found_in_half() -> None:
     assert dose is not None
     assert dose.half == pytest.approx(2.0, rel=0.15)
     assert dose.ninety == pytest.approx(2.0 * 9.0**0.25, rel=0.25)
-
-
-def test_no_single_effect_is_larger_than_an_instrument_in_use_can_have() -> None:
-    plan = make_plan(300, np.random.default_rng(8), 1.0, 1, strata={"single": 300})
-    sizes: dict[str, set[float]] = {}
-    for case in plan.cases:
-        for planted in case.spec.planted:
-            sizes.setdefault(planted.effect, set()).add(planted.size)
-    assert max(sizes["axis_tilt"]) == 7.5
-    assert max(sizes["wake_shadow"]) == 12.0
-    assert all(size <= MINIMUM_SIZES[name].most for name, of in sizes.items() for size in of)

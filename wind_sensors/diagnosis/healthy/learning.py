@@ -106,8 +106,7 @@ def _low_ratios(
         residual = comparison.measured.cosine[name] - trust.slope * simulated.cosine[name]
         edges = spectra.band_edges(residual.size)
         power = spectra.band_means(residual * residual, edges)
-        length = comparison.grid.n * comparison.grid.dt
-        frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * length)
+        frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * comparison.grid.n * 0.2)
         first = int(np.searchsorted(frequency, LOW_END))
         level = float(np.exp(np.mean(np.log(power[first : first + 3]))))
         for k, f in enumerate(frequency):
