@@ -139,3 +139,16 @@ def test_eddies_are_measured_by_the_wind_that_the_named_motion_gives() -> None:
     assert np.sqrt(np.mean(np.square(found.comparison.speed - right))) < 0.2 * away
     # What is compared stays the station as it was described, seen in that wind.
     assert found.comparison.station.platform == uav().platform
+
+
+def test_a_sensor_far_above_its_stated_place_is_found_there() -> None:
+    # Ten metres are the masthead of a yacht whose file says the deck.
+    stated = uav()
+    assert stated.platform is not None
+    x, y, z = stated.platform.sensor_position
+    moved = stated.platform.model_copy(update={"sensor_position": (x, y, z + 10.0)})
+    flight = flown(stated.model_copy(update={"platform": moved}), 53)
+    found = diagnose(replace(flight, station=stated), three_flights(), with_proof=False)
+    (finding,) = found.findings
+    assert finding.term.key == ("lever_arm", "platform")
+    assert finding.parameters["dz"].value == pytest.approx(10.0, abs=1.0)

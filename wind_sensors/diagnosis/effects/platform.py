@@ -167,7 +167,7 @@ LEVER_ARM = Effect(
     source="rigid-body kinematics",
     region="while the carrier rolls, pitches or turns",
     parameters=tuple(
-        Parameter(name, "m", -9.0, 9.0, minimum=0.5, step=0.1, starts=(-5.0, -2.0, 2.0, 5.0))
+        Parameter(name, "m", -30.0, 30.0, minimum=0.5, step=0.1, starts=(-5.0, -2.0, 2.0, 5.0))
         for name in ("dx", "dy", "dz")
     ),
     applies=_is_platform,
