@@ -134,8 +134,30 @@ raise SystemExit(run(build, []))
 """
 
 
+STOPPED_WHILE_A_MISTAKE_IS_TOLD = """
+import os, signal, sys
+from wind_sensors.nodes.execution import run
+
+class Held:
+    def __del__(self):
+        1 / 0
+
+def tell(unraisable):
+    os.kill(os.getpid(), signal.SIGINT)
+    sys.__unraisablehook__(unraisable)
+
+def build():
+    Held()
+    return []
+
+sys.unraisablehook = tell
+raise SystemExit(run(build, []))
+"""
+
+
+@pytest.mark.parametrize("script", [STOPPED_WITHIN_A_DESTRUCTOR, STOPPED_WHILE_A_MISTAKE_IS_TOLD])
 def test_a_stop_within_a_destructor_is_silent_and_other_mistakes_there_are_not(
-    tmp_path: Path,
+    script: str, tmp_path: Path
 ) -> None:
     environment = os.environ | {
         "ROS_LOG_DIR": str(tmp_path),
@@ -143,7 +165,7 @@ def test_a_stop_within_a_destructor_is_silent_and_other_mistakes_there_are_not(
         "ROS_DOMAIN_ID": str(100 + os.getpid() % 100),
     }
     done = subprocess.run(
-        [sys.executable, "-c", STOPPED_WITHIN_A_DESTRUCTOR],
+        [sys.executable, "-c", script],
         env=environment, capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

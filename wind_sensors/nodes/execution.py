@@ -89,7 +89,8 @@ class _StopSignals:
             os._exit(0)
         if self.phase is _Phase.BUILDING:
             self.stopped = True
-            raise _Stopped
+            if not _is_reporting(frame):
+                raise _Stopped
         # While running, rclpy has shut its context down and the spinning loop sees that.
 
 
@@ -98,6 +99,13 @@ _stop_signals = _StopSignals()
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
     _stop_signals.report_unraisable(unraisable)
+
+
+def _is_reporting(frame: FrameType | None) -> bool:
+    """Whether the hook for what nobody can catch is running, out of which nothing may be raised."""
+    while frame is not None and frame.f_code is not _unraisable.__code__:
+        frame = frame.f_back
+    return frame is not None
 
 
 def execute(target: str, arguments: Sequence[str] | None = None) -> int:
