@@ -12,19 +12,21 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class MinimumSize:
     """value in `unit`; meaning says of what; kinds are the stations where the effect can occur;
-    graded is false where an effect is there or is not."""
+    graded is false where an effect is there or is not; most is the largest size that an instrument
+    in use can have, in these units of its smallest."""
 
     value: float
     unit: str
     meaning: str
     kinds: str = "ABC"
     graded: bool = True
+    most: float = 12.0
 
 
 MINIMUM_SIZES: dict[str, MinimumSize] = {
     "wake_shadow": MinimumSize(0.06, "1", "loss of speed in the middle of the wake"),
     "flow_distortion": MinimumSize(0.02, "1", "largest change of speed with direction"),
-    "axis_tilt": MinimumSize(6.0, "deg", "lean of the sensor's axis"),
+    "axis_tilt": MinimumSize(6.0, "deg", "lean of the sensor's axis", most=7.5),
     "platform_velocity": MinimumSize(
         1.0, "1", "share of the platform's velocity missing from its odometry", "B", False
     ),
@@ -36,7 +38,7 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     "calibration_drift": MinimumSize(0.01, "1", "change of the indicated speed"),
     "calibration_offset": MinimumSize(0.12, "m/s", "loss of speed at every wind"),
     "bearing_friction": MinimumSize(0.12, "m/s", "loss of speed at 5 m/s"),
-    "air_density": MinimumSize(0.12, "1", "logarithm of the loss of density"),
+    "air_density": MinimumSize(0.12, "1", "logarithm of the loss of density", most=6.0),
     "rotor_inertia": MinimumSize(0.5, "1", "growth of the moment of inertia"),
     "torque_asymmetry": MinimumSize(0.25, "1", "growth of the torque while speeding up"),
     "damaged_cup": MinimumSize(0.03, "1", "loss of force on one cup or blade"),
@@ -48,7 +50,9 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     "vane_friction": MinimumSize(1.5, "deg", "angle at which the vane sticks at 5 m/s"),
     "vane_inertia": MinimumSize(0.4, "1", "growth of the vane's moment of inertia"),
     "vane_damping": MinimumSize(0.5, "1", "growth of the damping ratio at 8 m/s"),
-    "vane_imbalance": MinimumSize(1.2, "deg", "error of the vane at 5 m/s on a leaning axis"),
+    "vane_imbalance": MinimumSize(
+        1.2, "deg", "error of the vane at 5 m/s on a leaning axis", most=6.0
+    ),
     "missed_pulses": MinimumSize(0.01, "1", "share of the pulses lost"),
     "extra_pulses": MinimumSize(0.01, "1", "share of the pulses doubled"),
     "encoder_slot_error": MinimumSize(0.03, "1", "error of one slot in slot widths"),

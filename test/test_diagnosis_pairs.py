@@ -47,7 +47,7 @@ def test_what_does_the_same_as_another_promises_nothing_more() -> None:
 def test_a_heavy_rotor_in_a_bad_bearing_is_not_called_iced() -> None:
     """Ice makes a rotor slower and heavier with two numbers of one effect."""
     effects = catalogue()
-    friction = {"friction_speed": 1.4, "temperature_coefficient": 0.0, "breakaway": 1.0}
+    friction = {"friction_speed": 1.8, "temperature_coefficient": 0.0, "breakaway": 1.0}
     terms = [
         Term(effects["rotor_inertia"], "cup", {"inertia_factor": 2.5}),
         Term(effects["bearing_friction"], "cup", friction),

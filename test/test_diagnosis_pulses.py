@@ -11,10 +11,11 @@ from wind_sensors.diagnosis.comparing.observation import Grid
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
     interval_statistics,
-    unevenness_in_parts,
+    slot_intervals,
 )
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
@@ -75,9 +76,29 @@ def test_slots_are_followed_past_lost_and_doubled_edges(
 def test_slots_that_become_uneven_show_from_then_on() -> None:
     displaced = 0.05 * np.random.default_rng(3).standard_normal(SLOTS)
     cuts = np.linspace(0.0, TURNS * TURN, 13)
-    shown = unevenness_in_parts(edges(displaced, since=120.0), SLOTS, cuts)
+    shown = slot_intervals(edges(displaced, since=120.0), SLOTS).shown_in(cuts)
     begin = np.flatnonzero(cuts[:-1] >= 120.0)
     assert np.abs(shown[: begin[0] - 1]).max() < 0.1 * shown[begin].min()
+
+
+def test_the_place_of_each_slot_is_read_off_the_pulses() -> None:
+    displaced = np.clip(0.15 * np.random.default_rng(5).standard_normal(SLOTS), -0.3, 0.3)
+    displaced -= np.mean(displaced)
+    seen = slot_intervals(edges(displaced, since=120.0), SLOTS)
+    assert seen.displacements(130.0, TURNS * TURN) == pytest.approx(displaced, abs=0.01)
+    assert np.abs(seen.displacements(0.0, 110.0)).max() < 0.01
+
+
+def test_a_disc_is_simulated_with_the_slots_that_its_pulses_show() -> None:
+    slots = catalogue()["encoder_slot_error"]
+    displaced = 0.1 * np.random.default_rng(6).standard_normal(12)
+    displaced -= np.mean(displaced)
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    values = slot_values(displaced.tolist())
+    corrected = with_effect(STATION, slots, "cup", values).instrument("cup")
+    assert isinstance(corrected, Cup)
+    assert corrected.electronics.slot_errors == pytest.approx(displaced)
 
 
 def test_the_beginning_of_uneven_slots_is_part_of_the_finding() -> None:

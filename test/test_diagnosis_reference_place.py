@@ -118,9 +118,19 @@ def test_a_known_place_makes_the_comparison_closer_and_delays_telling() -> None:
         )
 
     assert misfit(seeing) < 0.8 * misfit(blind)
-    half = Term(catalogue()["timestamp_latency"], "cup", {"latency": 0.3})
-    assert is_a_way_of_the_wind(blind, half)
-    assert not is_a_way_of_the_wind(seeing, replace(half, values={"latency": 1.0}))
+    short = Term(catalogue()["timestamp_latency"], "cup", {"latency": 0.1})
+    healthy = blind.simulate(STATION)
+    assert is_a_way_of_the_wind(blind, short, healthy)
+    assert not is_a_way_of_the_wind(seeing, replace(short, values={"latency": 1.0}), healthy)
+
+
+def test_a_delay_that_other_instruments_do_not_show_is_not_the_winds_way() -> None:
+    latency = catalogue()["timestamp_latency"]
+    cup = Term(latency, "cup", {"latency": 0.35})
+    # The wind comes past the reference first on the one day, past the instruments on the other.
+    for seed, is_way in ((3, True), (9, False)):
+        blind = prepare(far(recorded(STATION, seed)))
+        assert is_a_way_of_the_wind(blind, cup, blind.simulate(STATION)) == is_way
 
 
 def test_a_baseline_keeps_the_place_until_the_reference_moves() -> None:

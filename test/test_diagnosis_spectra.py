@@ -64,3 +64,22 @@ def test_noise_variance_ignores_a_few_large_coefficients() -> None:
     clean = spectra.noise_variance(residual, None, 0)
     residual[[300, 700, 1500]] = 60.0
     assert spectra.noise_variance(residual, None, 0) == pytest.approx(clean, rel=0.1)
+
+
+def test_the_noise_of_narrow_bands_is_known_well() -> None:
+    # A median of each band alone errs by 0.4 in the logarithm there.
+    errors = []
+    for seed in range(200):
+        residual = np.random.default_rng(seed).standard_normal(2000)
+        errors.append(np.log(spectra.noise_variance(residual, None, 0))[30:100])
+    assert np.sqrt(np.mean(np.square(errors))) < 0.25
+    assert np.mean(errors) == pytest.approx(0.0, abs=0.1)
+
+
+def test_what_is_slow_does_not_raise_the_noise_above_it() -> None:
+    residual = np.random.default_rng(7).standard_normal(2000)
+    slow = residual.copy()
+    slow[:30] *= 30.0
+    ratio = np.ones(spectra.band_edges(2000).size - 1)
+    plain, disturbed = (spectra.noise_variance(r, ratio, 36) for r in (residual, slow))
+    assert disturbed == pytest.approx(plain)

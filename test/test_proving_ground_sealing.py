@@ -181,7 +181,10 @@ def test_strata_add_up(total: int) -> None:
 def test_single_effects_come_at_every_size_and_every_effect_before_any_again() -> None:
     plan = make_plan(0, np.random.default_rng(1), 1.0, 1, "AB", {"single": 60})
     planted = [c.spec.planted[0] for c in plan.cases]
-    assert {p.size_factor for p in planted} <= set(SIZES)
+    assert all(
+        p.size_factor in {min(size, MINIMUM_SIZES[p.effect].most) for size in SIZES}
+        for p in planted
+    )
     count = {p.effect: 0 for p in planted}
     for each in planted:
         count[each.effect] += 1
@@ -304,3 +307,14 @@ def test_the_dose_curve_finds_the_size_found_in_half() -> None:
     assert dose is not None
     assert dose.half == pytest.approx(2.0, rel=0.15)
     assert dose.ninety == pytest.approx(2.0 * 9.0**0.25, rel=0.25)
+
+
+def test_no_single_effect_is_larger_than_an_instrument_in_use_can_have() -> None:
+    plan = make_plan(300, np.random.default_rng(8), 1.0, 1, strata={"single": 300})
+    sizes: dict[str, set[float]] = {}
+    for case in plan.cases:
+        for planted in case.spec.planted:
+            sizes.setdefault(planted.effect, set()).add(planted.size_factor)
+    assert max(sizes["axis_tilt"]) == 7.5
+    assert max(sizes["wake_shadow"]) == 12.0
+    assert all(size <= MINIMUM_SIZES[name].most for name, of in sizes.items() for size in of)

@@ -195,7 +195,7 @@ def _deck(
             if not sizes.get(effect):
                 graded = MINIMUM_SIZES[effect].graded
                 sizes[effect] = [float(s) for s in rng.permutation(SIZES)] if graded else [3.0]
-            size = sizes[effect].pop()
+            size = min(sizes[effect].pop(), MINIMUM_SIZES[effect].most)
             yield int(rng.choice(able)), (Planted(str(effect), size),)
 
 

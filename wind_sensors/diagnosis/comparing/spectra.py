@@ -20,6 +20,18 @@ FloatArray = npt.NDArray[np.float64]
 _BAND_RATIO = 1.35
 _FIRST_BAND = 6
 _CHI_SQUARE_MEDIAN = 0.4549
+_LEAST = 1e-12
+
+_CAP = 4.0
+_CAPPED_MEAN = 0.9205
+_TURNS = 4
+"""A square counts up to so many times the variance, so that a line does not raise it; mean of what
+then counts of a normal number; turns in which the variance settles, from the median on. A mean of
+such squares needs two fifths of the numbers that a median needs to be as sure."""
+
+_ENOUGH = 200.0
+"""Bands with fewer coefficients are smoothed with their neighbours: what is unsure about the noise
+there would come and go with what is simulated, and decide between explanations."""
 
 
 def to_cosine(series: FloatArray) -> FloatArray:
@@ -58,6 +70,29 @@ def band_medians(values: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
     return np.array(
         [np.median(values[a:b]) for a, b in itertools.pairwise(edges)]
     )
+
+
+def robust_band_variances(squares: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
+    """Variance within each band, which a few large squares do not raise."""
+    number = np.diff(edges)
+    variance = band_medians(squares, edges) / _CHI_SQUARE_MEDIAN
+    for _ in range(_TURNS):
+        capped = np.minimum(squares, _CAP * np.repeat(variance, number))
+        variance = band_means(capped, edges) / _CAPPED_MEAN
+    return variance
+
+
+def smoothed_bands(variance: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
+    """Variances averaged, in their logarithms, with those beside them, where bands are narrow."""
+    weight = np.minimum(np.diff(edges), _ENOUGH)
+    beside = 1.0 - weight / _ENOUGH
+    logarithm = weight * np.log(np.maximum(variance, _LEAST))
+
+    def with_neighbours(values: FloatArray) -> FloatArray:
+        padded = np.pad(values, 1)
+        return values + beside * (padded[:-2] + padded[2:])
+
+    return np.asarray(np.exp(with_neighbours(logarithm) / with_neighbours(weight)))
 
 
 def spread_over(band_values: FloatArray, edges: npt.NDArray[np.intp], n: int) -> FloatArray:
@@ -135,7 +170,7 @@ def noise_variance(
 ) -> FloatArray:
     """Smooth, robust variance of the coefficients of a residual.
 
-    Medians of the squares in each band, so that a few large coefficients (a line, a slow trend
+    Large squares are capped in each band, so that a few large coefficients (a line, a slow trend
     that an effect causes) do not raise the variance they should be judged against. Below
     `low_end` the residual holds what the effects do; there the variance follows the band above
     it with the ratio that healthy recordings show.
@@ -148,11 +183,13 @@ def noise_variance(
     """
     n = len(residual)
     edges = band_edges(n)
-    variance = band_medians(residual * residual, edges) / _CHI_SQUARE_MEDIAN
+    variance = robust_band_variances(residual * residual, edges)
+    first = 0
     if low_ratio is not None:
-        first = int(np.searchsorted(edges, low_end))
-        first = min(first, len(variance) - 3)
-        level = float(np.exp(np.mean(np.log(np.maximum(variance[first : first + 3], 1e-12)))))
+        first = min(int(np.searchsorted(edges, low_end)), len(variance) - 3)
+    variance[first:] = smoothed_bands(variance[first:], edges[first:])
+    if low_ratio is not None:
+        level = float(np.exp(np.mean(np.log(variance[first : first + 3]))))
         variance[:first] = level * low_ratio[:first]
-    full = np.exp(spread_over(np.log(np.maximum(variance, 1e-12)), edges, n))
+    full = np.exp(spread_over(np.log(np.maximum(variance, _LEAST)), edges, n))
     return np.asarray(full)

@@ -104,6 +104,9 @@ class Effect:
             or slips), so that its simulation adds noise of its own.
         sticks: From the values, whether it holds and lets go: when it does so hangs on the last
             digit, so that it leaves noise of its own as what is `noisy` does.
+        unmistakable: The signals that tell its values tell that it is this effect, too. Silence
+            they tell, but not whether the sensor or its bearing is stuck; uneven intervals, but not
+            whether the disc or a cup makes them.
         stirs: It brings eddies of its own where it acts, of which the reference knows nothing.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
@@ -131,6 +134,7 @@ class Effect:
     form_error: float = 0.025
     noisy: bool = False
     sticks: Callable[[Values], bool] | None = None
+    unmistakable: bool = False
     stirs: bool = False
     standing: float = 0.1
     standing_in_calm: float = 0.0

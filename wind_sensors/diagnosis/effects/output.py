@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
@@ -104,21 +105,49 @@ _GOLDEN = 0.6180339887
 _NO_PATTERN = 1e-6
 
 
+def _in_and_besides(displacements: Sequence[float]) -> tuple[complex, list[complex], list[float]]:
+    """The swing of the slots' displacements once per turn, its waves, and what is left."""
+    n = len(displacements)
+    waves = [cmath.exp(2j * math.pi * k / n) for k in range(n)]
+    middle = sum(displacements) / n
+    swing = 2.0 * sum((d - middle) * w for d, w in zip(displacements, waves, strict=True)) / n
+    besides = [
+        d - middle - (swing * w.conjugate()).real
+        for d, w in zip(displacements, waves, strict=True)
+    ]
+    return swing, waves, besides
+
+
+def slot_values(displacements: Sequence[float]) -> dict[str, float]:
+    """Values of `encoder_slot_error` for slots whose places the pulses tell.
+
+    Args:
+        displacements: Of each slot from its place, in slot widths.
+    """
+    swing, _, besides = _in_and_besides(displacements)
+    return {
+        "scatter": math.sqrt(sum(d * d for d in besides) / len(besides)),
+        "once_per_turn": abs(swing),
+        **{f"slot_{k}": float(d) for k, d in enumerate(displacements)},
+    }
+
+
 def _slots(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Rotor)
     n = entry.pulses_per_revolution
-    # Beyond the swing once per turn the errors of single slots do not matter here.
-    pattern = [math.cos(2.0 * math.pi * (_GOLDEN * k * k + 0.1)) for k in range(n)]
-    waves = [cmath.exp(2j * math.pi * k / n) for k in range(n)]
-    middle = sum(pattern) / n
-    swing = 2.0 * sum((p - middle) * w for p, w in zip(pattern, waves, strict=True)) / n
-    rest = [
-        p - middle - (swing * w.conjugate()).real for p, w in zip(pattern, waves, strict=True)
-    ]
-    size = math.sqrt(sum(r * r for r in rest) / n)
+    told = "slot_0" in values
+    # Small errors act alike, wherever they are; of large ones and passing ones the slots matter.
+    swing, waves, besides = _in_and_besides(
+        [values[f"slot_{k}"] for k in range(n)]
+        if told
+        else [math.cos(2.0 * math.pi * (_GOLDEN * k * k + 0.1)) for k in range(n)]
+    )
+    size = math.sqrt(sum(d * d for d in besides) / n)
     scatter = values["scatter"] / size if size > _NO_PATTERN else 0.0
+    towards = swing / abs(swing) if told and abs(swing) > _NO_PATTERN else 1.0
     errors = tuple(
-        scatter * r + values["once_per_turn"] * w.real for r, w in zip(rest, waves, strict=True)
+        scatter * d + values["once_per_turn"] * (w * towards.conjugate()).real
+        for d, w in zip(besides, waves, strict=True)
     )
     return _electronics(entry, slot_errors=errors)
 
@@ -137,8 +166,8 @@ ENCODER_SLOT_ERROR = Effect(
     region="pulse intervals against rotor angle, all speeds alike",
     standing=0.0,
     parameters=(
-        Parameter("scatter", "1", 0.0, 0.3, minimum=0.012, step=0.004, starts=(0.03,)),
-        Parameter("once_per_turn", "1", 0.0, 0.5, minimum=0.017, step=0.004, starts=(0.05,)),
+        Parameter("scatter", "1", 0.0, 0.5, minimum=0.012, step=0.004, value_from="signals"),
+        Parameter("once_per_turn", "1", 0.0, 0.5, minimum=0.017, step=0.004, value_from="signals"),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor) and entry.pulses_per_revolution > 2,
     update=_slots,

@@ -280,6 +280,7 @@ QUANTISATION = Effect(
     update=_quantisation,
     exact=True,
     noisy=True,
+    unmistakable=True,
     templates=({"step": 5.0, "origin": 0.0}, {"step": 22.5, "origin": 0.0}),
     confusable={"vane_friction": "strong wind: friction fades, steps stay"},
 )

@@ -50,7 +50,9 @@ MANY_FORMS = 3
 large the effect is: a lean makes of an imbalance what the wind's wandering needs."""
 
 ACCEPTED_FURTHER_GAIN = 20.0
-"""The same for a second effect on the same signals."""
+LEAST_BESIDE_GAIN = 24.0
+"""The same for a second effect on the same signals; the first is what the simulation's form may err
+by, the second what must be brought at least."""
 
 ACCEPTED_ELSEWHERE_GAIN = 18.0
 """The same for a second effect on signals that the first does not reach."""
@@ -144,7 +146,9 @@ def brought(
     """
     newest = candidate.fit.terms[-1]
     comparison = searcher.comparison
-    if not plausible(candidate.fit) or is_a_way_of_the_wind(comparison, newest):
+    if not plausible(candidate.fit):
+        return -np.inf
+    if is_a_way_of_the_wind(comparison, newest, current.simulated):
         return -np.inf
     if reads_in_its_gap(comparison, newest):
         return -np.inf
@@ -201,7 +205,7 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf
     own = times_beside(further) * inexact(searcher, whitener, current, longer)
-    return max(own, ACCEPTED_FURTHER_GAIN)
+    return max(own, LEAST_BESIDE_GAIN)
 
 
 def times_beside(further: Term) -> float:

@@ -50,7 +50,7 @@ class Term:
     Attributes:
         effect: The effect.
         instrument: Name of the instrument, or `platform`.
-        values: Parameters.
+        values: Parameters, and what else the signals tell the effect's simulation.
         interval: Start and end [s since the start of the recording]; (0, None) is always.
         held: Names of parameters that keep their values in a fit: the signals tell them, or the
             recording does not.
@@ -88,13 +88,8 @@ class Term:
 
     @property
     def is_told(self) -> bool:
-        """Whether the signals tell everything about it, that it is this among it.
-
-        Silence they tell, but not whether the sensor or its bearing is stuck.
-        """
-        return not self.effect.occasional and all(
-            p.value_from == "signals" for p in self.effect.parameters
-        )
+        """Whether the signals tell everything about it, that it is this among it."""
+        return self.effect.unmistakable
 
 
 def suggested(effect: str, instrument: str, **values: float) -> Term:
@@ -161,7 +156,8 @@ def _with_values(terms: Sequence[Term], values: FloatArray) -> tuple[Term, ...]:
         names = [p.name for p in term.effect.parameters]
         part = values[place : place + len(names)]
         place += len(names)
-        out.append(replace(term, values=dict(zip(names, part.tolist(), strict=True))))
+        fitted = dict(zip(names, part.tolist(), strict=True))
+        out.append(replace(term, values={**term.values, **fitted}))
     return tuple(out)
 
 

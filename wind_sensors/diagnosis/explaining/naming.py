@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from wind_sensors.diagnosis.explaining.acceptance import (
-    all_plausible,
-)
+from wind_sensors.diagnosis.explaining.acceptance import ACCEPTED_GAIN, all_plausible
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
     Alone,
     Alternative,
     Naming,
+    in_own_noise,
     judged,
     no_terms,
     seen_in,
@@ -114,7 +113,8 @@ def kept_if_better(searcher: Searcher, known: Naming, found: Naming) -> Naming:
     if not wins or best.evidence > other.evidence - CLEARLY_BETTER or not all_plausible(best.fit):
         return found
     settled = _settled(searcher, best.fit, found.alternatives, found.screened)
-    return replace(settled, alone=found.alone)
+    # In its own noise a flexible effect gains what it has fitted away.
+    return replace(settled, alone=found.alone) if settled.gain > ACCEPTED_GAIN else found
 
 
 def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:
@@ -208,10 +208,32 @@ def _with_another(
     if len(current.terms) == 1:
         single = leading_alone(searcher, current, first.terms)
         if len(pair.terms) == 1 or single.terms[0].key == current.terms[0].key:
-            return single, tuple(a for a in losers if len(a.fit.terms) == 1)
+            return single, _behind(searcher, single, first, losers)
         # What would replace both does less than the first does alone.
         current = pair
     return swapped(searcher, whitener, current, newest, excluded)
+
+
+def _behind(
+    searcher: Searcher, single: Fit, first: Fit, losers: Sequence[Alternative]
+) -> tuple[Alternative, ...]:
+    """Single effects that lost against one of them that took the first one's place.
+
+    Args:
+        searcher: The search.
+        single: The one that is left.
+        first: The one that led.
+        losers: Those behind that one.
+    """
+    if single.terms[0].key == first.terms[0].key:
+        return tuple(losers)
+    ahead = in_own_noise(searcher, first) - in_own_noise(searcher, single)
+    others = [Alternative(first, 0.0), *losers]
+    return tuple(
+        replace(a, behind=a.behind + ahead)
+        for a in others
+        if len(a.fit.terms) == 1 and a.fit.terms[0].key != single.terms[0].key
+    )
 
 
 def _settled(

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import BANDS
-from wind_sensors.diagnosis.comparing.raw_statistics.pulses import unevenness_in_parts
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import SlotIntervals, slot_intervals
+from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, suggested
-from wind_sensors.diagnosis.explaining.intervals import interval_of
+from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
 from wind_sensors.station.model import Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -155,28 +156,23 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         BANDS + 2 : BANDS + 4
     ]
     slots = rotor.pulses_per_revolution
-    if slots > 2 and max(scatter, once) > 0.01:
-        # An interval is the difference of two slots' displacements.
-        holds, larger = _uneven_span(comparison, time, slots)
-        uneven = suggested(
-            "encoder_slot_error", rotor.name,
-            scatter=larger * float(scatter) / np.sqrt(2.0),
-            once_per_turn=larger * float(once) / (2.0 * np.sin(np.pi / slots)),
-        )  # fmt: skip
+    if slots > 2 and max(scatter, once) > 0.003:
+        seen = slot_intervals(time, slots)
+        holds = _uneven_span(comparison, seen)
+        told = seen.displacements(*window_of(comparison, holds)).tolist()
+        uneven = suggested("encoder_slot_error", rotor.name, **slot_values(told))
         out.append(replace(uneven, interval=holds))
     return out
 
 
-def _uneven_span(
-    comparison: Comparison, time: FloatArray, slots: int
-) -> tuple[Interval, float]:
-    """When slots are uneven, and how much more so then than in the mean of the whole record."""
+def _uneven_span(comparison: Comparison, seen: SlotIntervals) -> Interval:
+    """When slots are uneven."""
     length = comparison.grid.n * comparison.grid.dt
     cuts = np.linspace(0.0, length, PARTS_OF_PULSES + 1)
-    shown = unevenness_in_parts(time, slots, cuts)
+    shown = seen.shown_in(cuts)
     told = np.isfinite(shown)
     if not told.any():
-        return ALWAYS, 1.0
+        return ALWAYS
     number = np.concatenate(([0.0], np.cumsum(told)))
     total = np.concatenate(([0.0], np.cumsum(np.where(told, shown, 0.0))))
     begin, end = np.triu_indices(cuts.size, 1)
@@ -185,9 +181,8 @@ def _uneven_span(
     drop = within**2 / parts
     best = int(np.argmax(drop))
     if drop[best] < PASSING_UNEVENNESS * total[-1] ** 2 / number[-1]:
-        return ALWAYS, 1.0
-    holds = interval_of(comparison, float(cuts[begin[best]]), float(cuts[end[best]]))
-    return holds, float(within[best] / parts[best] / (total[-1] / number[-1]))
+        return ALWAYS
+    return interval_of(comparison, float(cuts[begin[best]]), float(cuts[end[best]]))
 
 
 def _dead_times(

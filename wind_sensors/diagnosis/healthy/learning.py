@@ -106,7 +106,8 @@ def _low_ratios(
         residual = comparison.measured.cosine[name] - trust.slope * simulated.cosine[name]
         edges = spectra.band_edges(residual.size)
         power = spectra.band_means(residual * residual, edges)
-        frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * comparison.grid.n * 0.2)
+        length = comparison.grid.n * comparison.grid.dt
+        frequency = 0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * length)
         first = int(np.searchsorted(frequency, LOW_END))
         level = float(np.exp(np.mean(np.log(power[first : first + 3]))))
         for k, f in enumerate(frequency):

@@ -36,6 +36,13 @@ the reference's place."""
 SINGLE_LAG = 0.25
 """The same of what a channel adds of its own, and of the change within half a record."""
 
+APART = 0.75
+"""What a delay of one instrument may differ from that of the others in the same eddies, in
+separations: three times `SINGLE_LAG`."""
+
+LONGEST_DELAY = 3.0
+"""Delays of other instruments are looked for up to this [s]."""
+
 SURELY = 2.0
 """Standard deviations that a delay may be long for the wind's way from a known place."""
 
@@ -95,23 +102,56 @@ def misplaced(comparison: Comparison, station: Station, without: Simulated) -> F
     return np.array([np.nan_to_num(m.flat(comparison.channels) - healthy) for m in moved])
 
 
-def is_a_way_of_the_wind(comparison: Comparison, term: Term) -> bool:
+def is_a_way_of_the_wind(comparison: Comparison, term: Term, before: Simulated) -> bool:
     """Whether a delay is no longer than the wind takes between reference and instruments.
 
-    A drift may come from delays of either sign at the record's ends.
+    A drift may come from delays of either sign at the record's ends. The way is much the same to
+    all instruments, so that a delay of one which the others do not show is none.
+
+    Args:
+        comparison: The recording.
+        term: The delay.
+        before: Simulation without it.
     """
     slow = float(np.quantile(comparison.speed, SLOW_WIND))
+    separation = _separation(comparison)
     place = comparison.place
-    way = DETOUR * _separation(comparison) / slow
+    way = DETOUR * separation / slow
     if place is not None:
-        uncertain = np.hypot(place.error, SINGLE_LAG * _separation(comparison))
+        uncertain = np.hypot(place.error, SINGLE_LAG * separation)
         way = min(way, SURELY * float(uncertain) / slow)
     if term.effect.name == "timestamp_latency":
-        return abs(term.values["latency"]) < way
+        latency = term.values["latency"]
+        others = _delays_of_others(comparison, term, before)
+        alone = others and abs(latency - float(np.mean(others))) * slow > APART * separation
+        return abs(latency) < way and not alone
     if term.effect.name == "clock_drift":
         length = comparison.grid.n * comparison.grid.dt
         return abs(term.values["drift"]) * 1e-6 * length < 2.0 * way
     return False
+
+
+def _delays_of_others(comparison: Comparison, term: Term, simulated: Simulated) -> list[float]:
+    """Delays [s] of the channels that an effect does not reach."""
+    reached = comparison.affected(comparison.station, term.instrument)
+    return [
+        _delay(comparison.measured.series[c.name], simulated.series[c.name], comparison.grid.dt)
+        for c in comparison.channels
+        if c.instrument not in reached
+    ]
+
+
+def _delay(measured: FloatArray, simulated: FloatArray, dt: float) -> float:
+    """By how much a series is late [s]: where its covariance with its simulation is largest."""
+    reach = round(LONGEST_DELAY / dt)
+    late = measured - np.mean(measured)
+    early = (simulated - np.mean(simulated))[reach:-reach]
+    shifts = np.arange(-reach, reach + 1)
+    covariance = np.array([late[reach + k : late.size - reach + k] @ early for k in shifts])
+    best = int(np.clip(np.argmax(covariance), 1, covariance.size - 2))
+    below, top, above = covariance[best - 1 : best + 2]
+    between = 0.5 * (below - above) / min(below - 2.0 * top + above, -1e-12)
+    return float(shifts[best] + between) * dt
 
 
 def _separation(comparison: Comparison) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -264,39 +265,75 @@ FEWEST_IN_A_PART = 3
 """A part of the record with fewer intervals for each slot does not tell how uneven they are."""
 
 
-def unevenness_in_parts(time: FloatArray, slots: int, cuts: FloatArray) -> FloatArray:
-    """How far the slots' unevenness shows in parts of the record, in units of that of the whole.
+@dataclass(frozen=True)
+class SlotIntervals:
+    """Intervals of pulses by the slot at which they begin.
+
+    Attributes:
+        begin: Of each interval [s], ascending, shape (m,).
+        slot: Its slot, counted from the first edge, shape (m,).
+        deviation: From the mean of the turn around it, relative, shape (m,).
+        slots: Per turn.
+    """
+
+    begin: FloatArray
+    slot: npt.NDArray[np.intp]
+    deviation: FloatArray
+    slots: int
+
+    def means(self, here: slice = slice(None)) -> FloatArray:
+        """Mean deviation at each slot over some of the intervals, shape (slots,)."""
+        slot = self.slot[here]
+        number = np.maximum(np.bincount(slot, minlength=self.slots), 1)
+        return np.asarray(np.bincount(slot, self.deviation[here], self.slots) / number)
+
+    def shown_in(self, cuts: FloatArray) -> FloatArray:
+        """How far the unevenness shows in parts of the record, in units of that of the whole.
+
+        Args:
+            cuts: Ends of the parts [s], ascending, shape (parts + 1,).
+
+        Returns:
+            Shape (parts,); NaN where there are too few intervals.
+        """
+        whole = self.means()
+        pattern = whole - np.mean(whole)
+        shown = np.full(cuts.size - 1, np.nan)
+        for k, (i, j) in enumerate(itertools.pairwise(np.searchsorted(self.begin, cuts))):
+            if j - i >= FEWEST_IN_A_PART * self.slots:
+                there = self.means(slice(i, j))
+                shown[k] = float(there @ pattern) / max(float(pattern @ pattern), 1e-12)
+        return shown
+
+    def displacements(self, begin: float, end: float) -> FloatArray:
+        """How far each slot lies from its place in a part of the record, in slot widths.
+
+        Args:
+            begin, end: Of the part [s].
+
+        Returns:
+            Shape (slots,), with a mean of nought.
+        """
+        first, last = np.searchsorted(self.begin, (begin, end))
+        longer = self.means(slice(first, last))
+        displaced = np.cumsum(longer - np.mean(longer))
+        # An interval ends where the next slot is.
+        displaced = np.roll(displaced, 1)
+        return np.asarray(displaced - np.mean(displaced))
+
+
+def slot_intervals(time: FloatArray, slots: int) -> SlotIntervals:
+    """Intervals by slot, of the two ways to number the slots in the one that tells more.
 
     Args:
         time: Edges [s], ascending.
         slots: Per turn.
-        cuts: Ends of the parts [s], ascending, shape (parts + 1,).
-
-    Returns:
-        Shape (parts,); NaN where there are too few intervals.
     """
     plain, tracked = (
-        _deviations(edges, slots) for edges in (time, np.asarray(_by_slot(time, slots)))
+        SlotIntervals(*_deviations(edges, slots), slots)
+        for edges in (time, np.asarray(_by_slot(time, slots)))
     )
-    means = [_slot_means(slot, deviation, slots) for _, slot, deviation in (plain, tracked)]
-    right = int(np.var(means[1]) > np.var(means[0]))
-    at, slot, deviation = (plain, tracked)[right]
-    pattern = means[right] - np.mean(means[right])
-    places = np.searchsorted(at, cuts)
-    shown = np.full(cuts.size - 1, np.nan)
-    for k, (i, j) in enumerate(itertools.pairwise(places)):
-        if j - i >= FEWEST_IN_A_PART * slots:
-            there = _slot_means(slot[i:j], deviation[i:j], slots)
-            shown[k] = float(there @ pattern) / max(float(pattern @ pattern), 1e-12)
-    return shown
-
-
-def _slot_means(
-    slot: npt.NDArray[np.intp], deviation: FloatArray, slots: int
-) -> FloatArray:
-    """Mean relative deviation of the intervals that begin at each slot, shape (slots,)."""
-    number = np.maximum(np.bincount(slot, minlength=slots), 1)
-    return np.asarray(np.bincount(slot, deviation, slots) / number)
+    return tracked if np.var(tracked.means()) > np.var(plain.means()) else plain
 
 
 def _deviations(
