@@ -16,9 +16,13 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from wind_sensors.nodes.estimator_node import EstimatorNode
+from wind_sensors.nodes.kinds import kind_for
 from wind_sensors.nodes.quality import input_quality, output_quality
 from wind_sensors.nodes.receipts import RECEIPTS_TOPIC, ReceiptBook, ReceiptSender
+from wind_sensors.nodes.recorder import RecorderNode
 from wind_sensors.nodes.simulator import SimulatorNode
+from wind_sensors.recordings import load_station
 
 PATIENT = 300.0
 """Longest wait in a test [s]: only a test that would never end reaches it."""
@@ -149,4 +153,29 @@ def test_the_simulation_does_not_begin_before_listeners_are_matched(graph: Graph
     graph.spin(lambda: simulator._book.is_open, PATIENT)
     assert simulator._lonely_topics() == ["/cup/pulses"]
     teller.create_subscription(Header, "/cup/pulses", lambda _: None, input_quality(reliable=True))
+    graph.spin(lambda: simulator.elapsed > 0.0, PATIENT)
+
+
+def test_the_simulation_does_not_begin_before_the_results_have_their_listener(
+    graph: Graph, tmp_path: Path
+) -> None:
+    station = load_station("mast_cup_vane")
+    estimator = graph.add(
+        EstimatorNode,
+        kind=kind_for(station),
+        parameter_overrides=overrides(
+            station="mast_cup_vane", use_sim_time=True, reliable_inputs=True, send_receipts=True,
+            wait_for_subscribers=1, silence=600.0,
+        ),
+    )  # fmt: skip
+    simulator = graph.add(
+        SimulatorNode,
+        parameter_overrides=overrides(
+            station="mast_cup_vane", speed=10.0, wait_for_receipts=1, publish_clock=True
+        ),
+    )
+    graph.spin(lambda: not simulator._lonely_topics(), PATIENT)
+    estimator._receipts.send()
+    assert not estimator._receipts.has_begun and not simulator._book.is_open
+    graph.add(RecorderNode, folder=tmp_path / "recording", topics=None, station=station)
     graph.spin(lambda: simulator.elapsed > 0.0, PATIENT)

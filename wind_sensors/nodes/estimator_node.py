@@ -113,8 +113,15 @@ class EstimatorNode(Node):
                     depth=int(number(self._values["input_depth"])),
                 ),
             )
+        listeners = int(number(self._values["wait_for_subscribers"]))
         self._receipts = (
-            ReceiptSender(self, self._received_by_topic) if self._values["send_receipts"] else None
+            ReceiptSender(
+                self,
+                self._received_by_topic,
+                lambda: self._outputs.fewest_subscribers >= listeners,
+            )
+            if self._values["send_receipts"]
+            else None
         )
         wanted = bool(self._values["use_tf"]) and self.station.platform is not None
         self._mounting = MountingFromTf(self) if wanted and tf2_is_installed() else None

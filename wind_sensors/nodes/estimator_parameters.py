@@ -190,6 +190,15 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         f"Tell on {RECEIPTS_TOPIC} how many raw messages have come, so that a simulator can wait.",
     ),
     Parameter(
+        "wait_for_subscribers",
+        int,
+        0,
+        "With send_receipts: tell nothing, so that the simulator does not begin, before each "
+        "output has so many subscribers; one that finds it late has lost the first messages.",
+        minimum=0,
+        maximum=100,
+    ),
+    Parameter(
         "silence",
         float,
         2.0,

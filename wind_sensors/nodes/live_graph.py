@@ -194,6 +194,7 @@ def _estimator_parameters(
         "reliable_inputs": True,
         "input_depth": depth,
         "send_receipts": True,
+        "wait_for_subscribers": 1,
         "silence": _LONGEST_SILENCE,
         **{f"qos_overrides./{topic}.publisher.depth": depth for topic in _CLOSE_TOPICS},
     }

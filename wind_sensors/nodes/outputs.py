@@ -73,6 +73,7 @@ class WindPublishers:
         self.nmea_talker = ""
         self.nmea_period = _SECOND
         self._node = node
+        self._outlets: list[Publisher] = []
         self.platform = platform
         twist = TwistWithCovarianceStamped
         self._wind = self._advertise(twist, "wind")
@@ -89,7 +90,14 @@ class WindPublishers:
         self._last_sentence: int | None = None
 
     def _advertise(self, message_type: type[Any], topic: str) -> Publisher:
-        return advertise(self._node, message_type, topic, output_quality())
+        outlet = advertise(self._node, message_type, topic, output_quality())
+        self._outlets.append(outlet)
+        return outlet
+
+    @property
+    def fewest_subscribers(self) -> int:
+        """Of all topics, the number of subscribers of the one with the fewest."""
+        return min(int(outlet.get_subscription_count()) for outlet in self._outlets)
 
     def publish_estimates(self, estimates: Iterable[WindEstimate]) -> None:
         """`wind`, `wind/apparent`, `wind/body`, `wind/vector` and NMEA sentences."""

@@ -40,11 +40,22 @@ class ReceiptSender:
     Args:
         node: The listener; its full name stands in the receipt.
         counts: Messages so far, by resolved topic, also where there are none yet.
+        is_ready: Nothing is told, so that a simulator does not begin, before this is true.
+
+    Attributes:
+        has_begun: It was true.
     """
 
-    def __init__(self, node: Node, counts: Callable[[], Mapping[str, int]]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        counts: Callable[[], Mapping[str, int]],
+        is_ready: Callable[[], bool] = lambda: True,
+    ) -> None:
         self._name = node.get_fully_qualified_name()
         self._counts = counts
+        self._is_ready = is_ready
+        self.has_begun = False
         self._told: dict[str, int] = {}
         self._silent_for = 0
         self._publisher = advertise(
@@ -56,6 +67,9 @@ class ReceiptSender:
 
     def send(self) -> None:
         """Publish a receipt if there is something new, or nothing was said for a while."""
+        self.has_begun = self.has_begun or self._is_ready()
+        if not self.has_begun:
+            return
         counts = dict(self._counts())
         self._silent_for += 1
         if counts == self._told and self._silent_for < _REPEATED_AFTER:
