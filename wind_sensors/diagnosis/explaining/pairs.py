@@ -37,8 +37,8 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
 
-FITTED_PAIRS = 3
-"""So many of the most promising pairs are fitted."""
+FITTED_PAIRS = 5
+"""So many of the most promising starting points are fitted."""
 
 SEVERAL = 2
 SIMPLE_SHARE = 0.4
@@ -140,6 +140,8 @@ def promising_pairs(
     """Pairs whose fits together, each scaled, promise more than what leads; best first.
 
     Only of effects that always hold: two of which one passes imitate any form of one that does not.
+    What smooths a signal does not go with its size: such a pair starts from the sizes that both
+    have alone, too.
 
     Args:
         searcher: The search.
@@ -169,8 +171,9 @@ def promising_pairs(
         gain, sizes = promise(gram, seen, [i, j])
         gain -= parameter_cost(terms, kept[i].active + kept[j].active)
         if gain > promised + CLEARLY_BETTER:
-            scaled = [_scaled(t, float(s)) for t, s in zip(terms, sizes, strict=True)]
-            found.append((gain, scaled))
+            found.append((gain, [_scaled(t, float(s)) for t, s in zip(terms, sizes, strict=True)]))
+            if any(t.effect.smooths for t in terms):
+                found.append((gain, terms))
     return [terms for _, terms in sorted(found, key=lambda pair: -pair[0])]
 
 

@@ -50,11 +50,14 @@ LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
 
 UNEVEN = 12.0
-UNEVEN_SHARE = 0.015
+UNEVEN_SHARE = 0.1
+LARGE_UNEVEN = 30.0
+LARGE_UNEVEN_SHARE = 0.015
 """An effect has one size, whether its signal is lively or quiet: another one in lively moments must
-not drop the cost by more than this, or than this share of the gain (a form that errs by a tenth
-brings a hundredth). What refuses jumps, or sticks and slips in its own way, is taken for a filter
-or for friction otherwise."""
+not drop the cost by more than the first, or than this share of the gain (a vane that stalls in
+gusts has sizes a third apart), as long as that is no more than the third, or than the last share (a
+form that errs by a tenth brings a hundredth). What refuses jumps, or sticks and slips in its own
+way, is taken for a filter or for friction otherwise."""
 
 SPEED_TIME = 5.0
 WITH_SPEED = 14.0
@@ -317,7 +320,8 @@ def is_uneven(naming: Naming, station: Station) -> bool:
 
     Those whose form is certain are held to one size in all parts of the record instead.
     """
-    most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
+    large = max(LARGE_UNEVEN, LARGE_UNEVEN_SHARE * naming.gain)
+    most = min(max(UNEVEN, UNEVEN_SHARE * naming.gain), large)
     return any(
         unevenness(naming, station, term) > most
         for term in naming.fit.terms

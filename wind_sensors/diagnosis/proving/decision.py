@@ -50,7 +50,8 @@ REMAINDER_SHARE = 0.025
 LEAST_REMAINDER = 0.006
 """A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
 times its share of what there was to explain is more than the second, and that share more than the
-third: of a large effect the form may leave more."""
+third: of a large effect the form may leave more, and of two four times as much, each with its own
+and with what it makes of the other's."""
 
 REMAINDER_P = 0.05
 """Nor does a remainder count that a healthy day shows with more probability."""
@@ -124,8 +125,9 @@ def remainder_of(
     """What is left in the channels that the named effects reach.
 
     What another instrument shows beside them says nothing against the names, unless it carries the
-    one that they change (a vane off the wind takes its propeller along), nor does what a healthy
-    day shows as loudly, nor some more power of eddies if they bring eddies of their own.
+    one that they change (a vane off the wind takes its propeller along) and stands out by itself;
+    nor does what a healthy day shows as loudly, nor some more power of eddies if they bring eddies
+    of their own.
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
@@ -133,7 +135,7 @@ def remainder_of(
         channels = changed | carriers_of(comparison, changed)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
         own = [stirred and r.kind in STIRRED_KINDS for r in bank.regions]
-        outside = [_is_outside(r, naming) for r in bank.regions]
+        outside = [r.channel not in changed or _is_outside(r, naming) for r in bank.regions]
         scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
         scores *= np.where(outside, REMAINDER_SCORE, 1.0) / np.where(own, STIRRED_TIMES, 1.0)
     score, relative = _largest(scores, bank, comparison, baseline)
@@ -271,7 +273,8 @@ def verdict_of(
     asked_for = located_p <= REMAINDER_P or naming.gain > certain
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
-    sizeable = share > max(REMAINDER_SHARE / max(remainder.score, 1e-9), LEAST_REMAINDER)
+    product = REMAINDER_SHARE * len(naming.fit.terms) ** 2
+    sizeable = share > max(product / max(remainder.score, 1e-9), LEAST_REMAINDER)
     bent = any(len(term.effect.parameters) >= FREELY_BENT for term in naming.fit.terms)
     counts = (p < REMAINDER_P and sizeable) or (p < BENT_REMAINDER_P and bent)
     if (remainder.score > REMAINDER_SCORE and counts) or _patchwork(naming):
