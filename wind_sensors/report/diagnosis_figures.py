@@ -177,9 +177,10 @@ def statistics_figure(
         return None
     after = before if corrected is None else departures(corrected)
     bands = [eddies(channel, NORMALISED_BANDS[k : k + 2]) for k in range(BANDS)]
-    labels = [*bands, *STATISTICS[channel.kind]]
+    labels = [label_for(width, label) for label in (*bands, *STATISTICS[channel.kind])]
+    lines = max(labels[k].count("\n") + 1 for k in shown)
     with style.house():
-        row_height = 0.38 if is_narrow(width) else 0.27
+        row_height = 0.11 + 0.16 * lines
         made = Figure(figsize=(width, 1.4 + row_height * shown.size), layout="constrained")
         axes = made.add_subplot()
         axes.axvspan(-_USUAL, _USUAL, color=style.GRID, zorder=0)
@@ -200,7 +201,7 @@ def statistics_figure(
                         ha=side, va="center", color=colour,
                     )  # fmt: skip
         axes.axvline(0.0, color=style.MUTED, linewidth=0.8)
-        axes.set_yticks(rows, [label_for(width, labels[k]) for k in shown])
+        axes.set_yticks(rows, [labels[k] for k in shown])
         axes.invert_yaxis()
         made.suptitle(
             f"Raw signals, {channel_words(channel.name)}",

@@ -44,7 +44,8 @@ table{border-collapse:collapse;width:100%;font-size:.95rem}
 th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
 th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .scroll{overflow-x:auto}
-@media(max-width:30rem){table{font-size:.8rem}th,td{padding:.3rem .25rem}}
+@media(max-width:30rem){table{font-size:.8rem}th,td{padding:.3rem .25rem}
+th.n,td.n{white-space:normal}}
 .bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
 .bar i{display:block;height:100%;background:var(--blue)}
 """
