@@ -12,7 +12,7 @@ from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.intervals import cell_signatures, window_of
 from wind_sensors.diagnosis.healthy.whitening import in_series
 from wind_sensors.station.model import Station
@@ -50,14 +50,17 @@ LIVELY_TIME = 5.0
 """A signal is lively or quiet by how fast it moves within so many seconds."""
 
 UNEVEN = 12.0
-UNEVEN_SHARE = 0.1
-LARGE_UNEVEN = 30.0
-LARGE_UNEVEN_SHARE = 0.015
+UNEVEN_SHARE = 0.015
 """An effect has one size, whether its signal is lively or quiet: another one in lively moments must
-not drop the cost by more than the first, or than this share of the gain (a vane that stalls in
-gusts has sizes a third apart), as long as that is no more than the third, or than the last share (a
-form that errs by a tenth brings a hundredth). What refuses jumps, or sticks and slips in its own
-way, is taken for a filter or for friction otherwise."""
+not drop the cost by more than this, or than this share of the gain (a form that errs by a tenth
+brings a hundredth). What refuses jumps, or sticks and slips in its own way, is taken for a filter
+or for friction otherwise."""
+
+PASSING_UNEVEN = 30.0
+PASSING_UNEVEN_SHARE = 0.1
+"""In a part of the record a few gusts make the lively moments, and their form does not average out:
+what begins or ends inside may differ by this share of its gain, as long as that is no more than the
+first."""
 
 SPEED_TIME = 5.0
 WITH_SPEED = 14.0
@@ -320,13 +323,15 @@ def is_uneven(naming: Naming, station: Station) -> bool:
 
     Those whose form is certain are held to one size in all parts of the record instead.
     """
-    large = max(LARGE_UNEVEN, LARGE_UNEVEN_SHARE * naming.gain)
-    most = min(max(UNEVEN, UNEVEN_SHARE * naming.gain), large)
-    return any(
-        unevenness(naming, station, term) > most
-        for term in naming.fit.terms
-        if not term.effect.exact and not term.effect.legible and not term.is_told
-    )
+    for term in naming.fit.terms:
+        if term.effect.exact or term.effect.legible or term.is_told:
+            continue
+        most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
+        if term.interval != ALWAYS:
+            most = max(most, min(PASSING_UNEVEN, PASSING_UNEVEN_SHARE * naming.gain))
+        if unevenness(naming, station, term) > most:
+            return True
+    return False
 
 
 def goes_with_speed(naming: Naming, station: Station) -> bool:
