@@ -20,9 +20,11 @@ from wind_sensors.diagnosis.explaining.rounds import best_beside
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.proving import contradictions
 from wind_sensors.diagnosis.proving.contradictions import (
     goes_with_speed,
     is_discordant,
+    is_uneven,
     varies,
 )
 from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
@@ -144,6 +146,43 @@ def test_a_series_of_harmonics_must_leave_nothing(effect: str, p: float, verdict
     naming = Naming(one, null, null, null.of(searcher.bank.without), 2000.0)
     little = Remainder(score=1.1, p=p, share=0.005)
     assert verdict_of(naming, [], little, {}, 0.002, Excess()) == verdict
+
+
+@pytest.mark.parametrize(
+    ("effects", "share", "verdict"),
+    [(1, 0.05, "unknown"), (2, 0.05, "named"), (1, 0.01, "named"), (2, 0.08, "unknown")],
+)
+def test_two_effects_each_in_its_own_form_may_leave_more_than_one(
+    effects: int, share: float, verdict: Verdict
+) -> None:
+    searcher, null = searched("calibration_drift", "cup", {"gain": 0.9})
+    drift = Term(catalogue()["calibration_drift"], "cup", {"gain": 0.9})
+    turn = Term(catalogue()["vane_offset"], "vane", {"offset": 5.0})
+    fitted = fit(null, STATION, [drift, turn][:effects], searcher.bank.without, iterations=0)
+    naming = Naming(fitted, null, null, null.of(searcher.bank.without), 2000.0)
+    left = Remainder(score=1.5, p=0.002, share=share)
+    assert verdict_of(naming, [], left, {}, 0.002, Excess()) == verdict
+
+
+@pytest.mark.parametrize(
+    ("drop", "gain", "interval", "uneven"),
+    [
+        (24.0, 250.0, ALWAYS, True),
+        (24.0, 250.0, (300.0, None), False),
+        (31.0, 400.0, (300.0, None), True),
+        (13.0, 60.0, (300.0, None), True),
+        (11.0, 60.0, ALWAYS, False),
+    ],
+)
+def test_few_gusts_make_the_lively_moments_of_a_part_of_the_record(
+    monkeypatch: pytest.MonkeyPatch, drop: float, gain: float, interval: Interval, uneven: bool
+) -> None:
+    searcher, null = searched("vane_inertia", "vane", {"inertia_factor": 2.0}, interval)
+    heavy = Term(catalogue()["vane_inertia"], "vane", {"inertia_factor": 2.0}, interval)
+    fitted = fit(null, STATION, [heavy], searcher.bank.without, iterations=0)
+    naming = Naming(fitted, null, null, null.of(searcher.bank.without), gain)
+    monkeypatch.setattr(contradictions, "unevenness", lambda *_: drop)
+    assert is_uneven(naming, STATION) is uneven
 
 
 def test_a_fit_leaves_a_hollow_that_small_steps_stay_in() -> None:

@@ -350,6 +350,30 @@ def test_a_wake_may_leave_some_more_eddies_than_the_simulation_knows(
     assert left.score == pytest.approx(300.0 / REMAINDER_SCORES[kind] / times)
 
 
+def test_what_a_vane_shows_beside_the_propeller_that_it_carries_has_to_stand_out_by_itself(
+    searcher: Searcher,
+) -> None:
+    carried = {
+        "name": "cup", "kind": "propeller", "pulses": {"topic": "/cup/pulses"},
+        "pulses_per_revolution": 6, "calibration_distance": 0.05, "distance_constant": 2.7,
+        "mounted_on": "vane",
+    }  # fmt: skip
+    station = Station.model_validate({"instruments": [carried, STATION.instrument("vane")]})
+    seen = replace(searcher.comparison, station=station)
+    naming = named(searcher, drift())
+    left = [
+        remainder_of(
+            naming,
+            _Loud((Region(name, "time", 0.0, 90.0, "0 to 90 s"),), np.zeros((0, 0)), (), (),
+                  np.zeros(0)),
+            seen, baseline(),
+        ).score
+        for name in ("cup/rotor_rate", "vane/vane_angle")
+    ]  # fmt: skip
+    assert left[0] == pytest.approx(300.0 / REMAINDER_SCORES["time"])
+    assert left[1] == pytest.approx(REMAINDER_SCORE * left[0])
+
+
 def test_what_was_known_before_stays_if_it_fits_clearly_better() -> None:
     slow = with_effect(STATION, catalogue()["rotor_inertia"], "cup", {"inertia_factor": 3.0})
     searcher = searcher_of(prepare(recorded(slow, 96)), baseline(), catalogue(), {})
