@@ -14,8 +14,7 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.acceptance import owed
-from wind_sensors.diagnosis.explaining.explanation import total
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.moves import simplified, swapped
 from wind_sensors.diagnosis.explaining.pairs import built_on_simple, promise, promising_pairs
@@ -47,29 +46,23 @@ def test_what_does_the_same_as_another_promises_nothing_more() -> None:
 
 
 def test_a_pair_that_smooths_starts_from_the_sizes_that_both_have_alone_too() -> None:
-    """A rotor twice as heavy does not smooth twice as much as one of half the excess does."""
     effects = catalogue()
-    terms = [
+    both = [
         Term(effects["air_density"], "station", {"density_ratio": 0.45}),
         Term(effects["vane_eccentricity"], "vane", {"sine": -6.0, "cosine": 1.0}),
     ]
-    searcher = searcher_of(
-        prepare(recorded(planted(STATION, terms), 68)), baseline(), effects, {}
-    )
+    recording = recorded(planted(STATION, both), 68)
+    searcher = searcher_of(prepare(recording), baseline(), effects, {})
     first = first_round(searcher)
     nothing = fit(first.whitener, STATION, [], searcher.bank.without)
     pairs = promising_pairs(searcher, first.whitener, first.singles, nothing)
-    alone = {f.terms[0].key: f.terms[0].values for f in sorted(first.singles, key=total)[::-1]
-             if f.terms[0].interval == ALWAYS}  # fmt: skip
-    smoothing = [p for p in pairs if any(t.effect.smooths for t in p)]
+    alone = [f.terms[0] for f in first.singles]
+    smoothing = [pair for pair in pairs if any(t.effect.smooths for t in pair)]
     assert smoothing
     for pair in smoothing:
-        keys = [t.key for t in pair]
-        assert any(
-            all(t.values == alone[t.key] for t in other)
-            for other in smoothing
-            if [t.key for t in other] == keys
-        )
+        same = [other for other in smoothing if [t.key for t in other] == [t.key for t in pair]]
+        as_alone = [all(any(t is one for one in alone) for t in other) for other in same]
+        assert sorted(as_alone) == [False, True]
 
 
 def test_a_heavy_rotor_in_a_bad_bearing_is_not_called_iced() -> None:

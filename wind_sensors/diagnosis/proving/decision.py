@@ -135,9 +135,9 @@ def remainder_of(
         channels = changed | carriers_of(comparison, changed)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
         own = [stirred and r.kind in STIRRED_KINDS for r in bank.regions]
-        outside = [r.channel not in changed or _is_outside(r, naming) for r in bank.regions]
+        untouched = [r.channel not in changed or _is_outside(r, naming) for r in bank.regions]
         scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
-        scores *= np.where(outside, REMAINDER_SCORE, 1.0) / np.where(own, STIRRED_TIMES, 1.0)
+        scores *= np.where(untouched, REMAINDER_SCORE, 1.0) / np.where(own, STIRRED_TIMES, 1.0)
     score, relative = _largest(scores, bank, comparison, baseline)
     share = score / (score + max(naming.gain, 0.0)) if naming.fit.terms else 1.0
     return Remainder(relative, bank.p_value(score), share)
