@@ -60,7 +60,8 @@ footer{color:var(--muted);font-size:.9rem;margin-top:2rem}
 code{font:.92em ui-monospace,monospace;background:#eef2f5;border-radius:5px;padding:.1em .35em}
 @media(max-width:640px){body{font-size:16px}main{padding:1.5rem .8rem 3rem}
 section{padding:1.1rem .9rem .7rem}
-.numbers{grid-template-columns:1fr 1fr}.number b{font-size:1.25rem}.number{padding:.8rem .85rem}}
+.numbers{grid-template-columns:repeat(2,minmax(0,1fr));gap:.5rem}
+.number b{font-size:1.05rem}.number{padding:.7rem .6rem}}
 """
 
 
