@@ -17,9 +17,9 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.ruled_out import reads_in_its_gap
+from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Pulses
@@ -151,9 +151,22 @@ def test_a_vane_that_reads_in_steps_has_no_gap_where_it_reads() -> None:
     real = prepare(recorded(with_effect(STATION, gap, "vane", gapped), 84))
     stepped = prepare(recorded(coarse, 84))
     term = Term(gap, "vane", gapped)
-    assert reads_in_its_gap(stepped, term)
-    assert not reads_in_its_gap(real, term)
-    assert not reads_in_its_gap(stepped, Term(gap, "vane", {**gapped, "form": 2.0}))
+    assert ruled_out(stepped, STATION, [term])
+    assert not ruled_out(real, STATION, [term])
+    assert not ruled_out(stepped, STATION, [Term(gap, "vane", {**gapped, "form": 2.0})])
+
+
+def test_the_gap_of_a_vane_that_counts_backwards_is_looked_for_on_its_other_side() -> None:
+    gap = Term(
+        catalogue()["potentiometer_gap"],
+        "vane",
+        {"centre": 190.0, "width": 40.0, "reading": 0.0, "form": 0.0},
+    )
+    swap = Term(catalogue()["sensor_swap"], "vane", {"reversed": 1.0})
+    only_swapped = prepare(recorded(swap.planted(STATION), 84))
+    both = prepare(recorded(planted(STATION, [swap, gap]), 84))
+    assert ruled_out(only_swapped, STATION, [swap, gap])
+    assert not ruled_out(both, STATION, [swap, gap])
 
 
 def test_what_the_recording_does_not_show_is_held_where_it_was() -> None:

@@ -17,7 +17,6 @@ from wind_sensors.diagnosis.explaining.explanation import (
 )
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
-from wind_sensors.diagnosis.explaining.ruled_out import reads_in_its_gap
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
@@ -149,8 +148,6 @@ def brought(
     if not plausible(candidate.fit):
         return -np.inf
     if is_a_way_of_the_wind(comparison, newest, current.simulated):
-        return -np.inf
-    if reads_in_its_gap(comparison, newest):
         return -np.inf
     whitener = candidate.whitener
     before = (

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import headings
+from wind_sensors.station.model import Angle, Station
 
 FLOATS = 2.0
 """Form of a gap in which the reading may be anything."""
@@ -23,28 +26,52 @@ ONE_VALUE = np.radians(0.5)
 """Readings so close to the one value of a gap are that value [rad]."""
 
 
-def reads_in_its_gap(comparison: Comparison, term: Term) -> bool:
+def ruled_out(comparison: Comparison, station: Station, terms: Sequence[Term]) -> bool:
+    """Whether the raw signals show what one of the effects of an explanation forbids.
+
+    Args:
+        comparison: The recording.
+        station: As commissioned.
+        terms: The explanation.
+    """
+    return any(_reads_in_its_gap(comparison, station, term, terms) for term in terms)
+
+
+def _reads_in_its_gap(
+    comparison: Comparison, station: Station, term: Term, terms: Sequence[Term]
+) -> bool:
     """Whether a vane shows directions that a gap, as it is said to be, cannot show.
 
     Args:
         comparison: The recording.
+        station: As commissioned.
         term: Any effect; only a gap that does not float is asked.
+        terms: All effects: a vane that counts the other way shows its gap on the other side.
     """
     if term.effect.name != "potentiometer_gap" or term.values["form"] == FLOATS:
         return False
     (channel,) = (c for c in comparison.channels if c.instrument == term.instrument)
     readings = comparison.recording.angles[term.instrument]
+    turned = _counts_backwards(station, term.instrument) != _counts_backwards(
+        planted(station, terms), term.instrument
+    )
+    angle = -readings.angle if turned else readings.angle
     since = comparison.grid.seconds(readings.time) + comparison.drive.elapsed
     begin, end = term.interval
     holds = (since >= begin) & (since <= (np.inf if end is None else end))
     centre = np.radians(term.values["centre"])
     reach = 0.5 * INSIDE * np.radians(term.values["width"])
-    shown = np.abs(np.angle(np.exp(1j * (readings.angle - centre)))) < reach
+    shown = np.abs(np.angle(np.exp(1j * (angle - centre)))) < reach
     if term.values["form"] != 0.0:
-        away = readings.angle - np.radians(term.values["reading"])
+        away = angle - np.radians(term.values["reading"])
         shown &= np.abs(np.angle(np.exp(1j * away))) > ONE_VALUE
     should = np.abs(np.angle(np.exp(1j * (headings(comparison, channel) - centre)))) < reach
     expected = np.count_nonzero(should & holds)
     if expected < FEWEST_EXPECTED:
         return False
     return bool(np.count_nonzero(shown & holds) > READ_INSIDE * expected)
+
+
+def _counts_backwards(station: Station, vane: str) -> bool:
+    entry = station.instrument(vane)
+    return isinstance(entry, Angle) and entry.reversed

@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.bounds import without_idle, without_run_aways
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
+from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
     JOINT_TEMPLATES,
     Score,
@@ -310,24 +311,32 @@ class Searcher:
     def fit_all(
         self, whitener: Whitener, current: Fit | None, candidates: Sequence[Sequence[Term]]
     ) -> list[Fit]:
-        """Fits of the known terms, if there are any, with each candidate."""
+        """Fits of the known terms, if there are any, with each candidate.
+
+        Without those that the raw signals rule out.
+        """
         rest = self.bank.without
 
         def one(starts: Sequence[Term]) -> Fit:
             return self.best_fit(whitener, current, starts, rest)
 
-        fits: list[Fit] = in_parallel(one, list(candidates), self.workers)
-        return fits
+        return self._possible(in_parallel(one, list(candidates), self.workers))
 
     def refit_all(self, whitener: Whitener, explanations: Sequence[Sequence[Term]]) -> list[Fit]:
-        """Fits of whole explanations from where they are."""
+        """Fits of whole explanations from where they are.
+
+        Without those that the raw signals rule out.
+        """
         rest = self.bank.without
         fits: list[Fit] = in_parallel(
             lambda terms: fit(whitener, self.station, terms, rest, least=ROUGHLY),
             list(explanations),
             self.workers,
         )
-        return fits
+        return self._possible(fits)
+
+    def _possible(self, fits: Sequence[Fit]) -> list[Fit]:
+        return [f for f in fits if not ruled_out(self.comparison, self.station, f.terms)]
 
 
 def searcher_of(
