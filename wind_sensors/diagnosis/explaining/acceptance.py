@@ -92,8 +92,8 @@ name would have to take its place."""
 SMALLEST_TOLD = 0.4
 """The same of what the signals tell without a fit: left out, it would be a riddle."""
 
-SMALLEST_BESIDE = 1.8
-"""The same beside another effect on the same signals, whose form a small one may make good."""
+SMALLEST_BESIDE = 2.0
+"""The same beside a larger effect on the same signals, whose form a small one may make good."""
 
 EDDIES_AGAINST = 10.0
 """What smooths a signal shows in the power of its eddies: there it may not cost more than this,
@@ -191,18 +191,41 @@ def gained_by_eddies(whitener: Whitener, before: Fit, after: Fit) -> float:
 def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> float:
     """What a further term must bring if it acts on signals that the terms so far change."""
     further = longer.terms[-1]
-    reached = {
-        name
-        for term in current.terms
-        for name in searcher.comparison.affected(searcher.station, term.instrument)
-    }
-    beside = further.instrument in (reached | {STATION, PLATFORM})
-    if not current.terms or not beside or further.is_told:
+    if not acts_beside(searcher, further, current.terms) or further.is_told:
         return 0.0
     if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
         return np.inf
     own = times_beside(further) * inexact(searcher, whitener, current, longer)
     return max(own, LEAST_BESIDE_GAIN)
+
+
+def acts_beside(searcher: Searcher, further: Term, terms: Sequence[Term]) -> bool:
+    """Whether a term acts on signals that others change.
+
+    Args:
+        searcher: The search.
+        further: The term.
+        terms: The others.
+    """
+    reached = {
+        name
+        for term in terms
+        for name in searcher.comparison.affected(searcher.station, term.instrument)
+    }
+    return bool(terms) and further.instrument in (reached | {STATION, PLATFORM})
+
+
+def only_makes_good(searcher: Searcher, term: Term, terms: Sequence[Term]) -> bool:
+    """Whether one of several terms is so small that the form of a larger one may be all it mends.
+
+    Args:
+        searcher: The search.
+        term: The term.
+        terms: All of them.
+    """
+    larger = [t for t in terms if t.relative_size > term.relative_size]
+    small = term.relative_size < SMALLEST_BESIDE and not term.is_told
+    return small and acts_beside(searcher, term, larger)
 
 
 def times_beside(further: Term) -> float:

@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     large_enough,
     may_join,
     needed_gain,
+    only_makes_good,
     owed,
     plausible,
     times_beside,
@@ -123,6 +124,8 @@ def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
 def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit without what ran into its bounds, or became too small, when all were fitted together.
 
+    Too small is also what may only make good the form of another.
+
     Of an effect that says too much (ice without weight) what it contains may stay.
 
     Args:
@@ -131,7 +134,11 @@ def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         current: The explanation.
     """
     nothing = no_terms(whitener, searcher)
-    while not all_plausible(current) or too_small(searcher, current, total(nothing)):
+    while (
+        not all_plausible(current)
+        or too_small(searcher, current, total(nothing))
+        or any(only_makes_good(searcher, term, current.terms) for term in current.terms)
+    ):
         fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms))
         sound = [f for f in fewer if f.terms and all_plausible(f)]
         sound = sound or [f for f in fewer if f.terms]
@@ -146,7 +153,11 @@ def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
 
 def _simpler(searcher: Searcher, terms: Sequence[Term]) -> list[list[Term]]:
     """The terms without the implausible ones, and with what these contain in their place."""
-    sound = [term for term in terms if is_plausible(term)]
+    sound = [
+        term
+        for term in terms
+        if is_plausible(term) and not only_makes_good(searcher, term, terms)
+    ]
     out = [sound] if sound else []
     for term in terms:
         if is_plausible(term):
