@@ -204,4 +204,4 @@ def test_bounces_tell_their_delay() -> None:
     comparison = prepare(recorded(station, 79))
     (guess,) = (t for t in guesses_of(comparison, STATION)[("extra_pulses", "cup")])
     assert guess.held == {"bounce_delay"}
-    assert guess.values["bounce_delay"] == pytest.approx(0.0017, rel=0.02)
+    assert guess.values["bounce_delay"] == pytest.approx(0.0017, rel=0.06)

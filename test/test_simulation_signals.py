@@ -200,6 +200,7 @@ def test_lost_edges_are_the_stated_share_and_the_others_stay():
         (Electronics(loss_probability=0.3), 0.7),
         (Electronics(bounce_probability=0.2, bounce_delay=0.002), 1.2),
         (Electronics(bounce_probability=0.2, bounce_delay=0.002, dead_time=0.01), 1.0),
+        (Electronics(bounce_probability=0.2, bounce_delay=0.002, dead_time=0.001), 1.15),
     ],
 )
 def test_on_average_each_edge_counts_for_what_chance_makes_of_it(electronics, counts):
@@ -219,7 +220,11 @@ def test_bounces_follow_their_edges_and_dead_time_removes_them():
     found = seconds(edge_times(steadily_turning(cup(electronics=bouncing), seconds=300.0), "cup"))
     extra = np.setdiff1d(np.round(found, 8), np.round(every, 8))
     assert abs(len(extra) / len(every) - 0.2) < 0.03
-    assert np.all(np.min(np.abs(extra[:, None] - 0.002 - every[None, :]), axis=1) < 1e-7)
+    later = extra - every[np.searchsorted(every, extra) - 1]
+    assert later.max() < 0.004
+    error = 0.004 / np.sqrt(12 * len(extra))
+    assert later.mean() == pytest.approx(0.002, abs=4 * error)
+    assert later.std() == pytest.approx(0.004 / np.sqrt(12), rel=0.15)
     blind = Electronics(bounce_probability=0.2, bounce_delay=0.002, dead_time=0.01)
     kept = seconds(edge_times(steadily_turning(cup(electronics=blind), seconds=300.0), "cup"))
     np.testing.assert_allclose(kept, every, atol=1e-9)

@@ -16,8 +16,11 @@ _WITHIN_DEAD_TIME = 1.1
 """Allowance for slots of unequal width and for wind that changes between two edges."""
 _FEW = 8
 """So many intervals tell the first rate."""
-_BOUNCE = (0.6, 1.5)
-"""An edge that follows after this part of the bounce delay, from and to, is a false one."""
+_LONGEST_BOUNCE = 3.0
+"""An edge that follows within so many mean bounce delays is a false one. Most contacts are at rest
+after two."""
+_TOO_SOON = 0.7
+"""But no edge after this part of the interval before: that is the next slot."""
 
 
 def slots_between(intervals: FloatArray, dead_time: float) -> FloatArray:
@@ -92,7 +95,7 @@ class TurnCounter:
         if self._interval == 0.0 and time.size > 1:
             first = np.diff(time[: _FEW + 1]) * 1e-9
             if rotor.electronics.bounce_probability > 0.0:
-                first = first[first > _BOUNCE[1] * rotor.electronics.bounce_delay]
+                first = first[first > _LONGEST_BOUNCE * rotor.electronics.bounce_delay]
             slots = slots_between(first, rotor.electronics.dead_time)
             self._interval = float(np.median(first / slots)) if first.size else 0.0
         times: list[int] = []
@@ -134,8 +137,8 @@ class TurnCounter:
 
     def _is_false(self, since: float) -> bool:
         e = self._rotor.electronics
-        low, high = (share * e.bounce_delay for share in _BOUNCE)
-        return e.bounce_probability > 0.0 and low < since < min(high, 0.7 * self._interval)
+        longest = min(_LONGEST_BOUNCE * e.bounce_delay, _TOO_SOON * self._interval)
+        return e.bounce_probability > 0.0 and since < longest
 
     def _is_silenced(self, last: int, now: int) -> bool:
         """Whether an outage lies between two edges."""

@@ -20,6 +20,9 @@ FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 
+LONGEST_BOUNCE = 2.0
+"""A contact that bounces closes again at any time up to so many mean delays, each as likely."""
+
 CLOSE = 1e-6
 """A Newton step this small leaves an error of the order of its square, far below a nanosecond."""
 
@@ -237,8 +240,9 @@ class PulseCircuit:
                 update={"electronics": electronics.model_copy(update=sure)}
             )
             part = self._recorded(certain, times, numbers, end)
-            heard = electronics.bounce_delay >= electronics.dead_time
-            bounces = electronics.bounce_probability if heard else 0.0
+            longest = LONGEST_BOUNCE * electronics.bounce_delay
+            heard = max(1.0 - electronics.dead_time / longest, 0.0)
+            bounces = electronics.bounce_probability * heard
             time.append(part)
             counts = (1.0 - electronics.loss_probability + bounces) / rotor.pulses_per_revolution
             weights.append(np.full(part.size, counts))
@@ -281,7 +285,9 @@ class PulseCircuit:
         bounces: TimeArray = np.empty(0, dtype=np.int64)
         if electronics.bounce_probability > 0.0:
             bouncing = self._drawn("bounce", numbers) < electronics.bounce_probability
-            bounces = times[bouncing] + round(electronics.bounce_delay * 1e9)
+            share = self._drawn("bounce delay", numbers[bouncing])
+            delay = LONGEST_BOUNCE * electronics.bounce_delay * share
+            bounces = times[bouncing] + np.rint(delay * 1e9).astype(np.int64)
         if electronics.loss_probability > 0.0:
             times = times[self._drawn("loss", numbers) >= electronics.loss_probability]
         if bounces.size or self._waiting.size:

@@ -100,7 +100,7 @@ class Electronics(Entry):
     bounce_probability: float = Field(default=0.0, ge=0.0, lt=1.0)
     """Share of the edges followed by a false one."""
     bounce_delay: Positive = 0.002
-    """Delay of the false edge [s]."""
+    """Mean delay of the false edges [s]; a contact closes again at any time up to twice that."""
     slot_errors: tuple[float, ...] = ()
     """Displacement of each slot, as a fraction of the nominal slot width; one per slot."""
 

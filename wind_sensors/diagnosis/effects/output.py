@@ -84,7 +84,8 @@ EXTRA_PULSES = Effect(
     name="extra_pulses",
     meaning="A bouncing contact adds false pulses shortly after true ones.",
     entrance="output",
-    equation="a second edge follows after the bounce delay, with the bounce probability",
+    equation="with the bounce probability a second edge follows, at any time up to twice the "
+    "bounce delay",
     source="contact bounce of a reed switch",
     region="very short pulse intervals, all speeds",
     standing=0.0,

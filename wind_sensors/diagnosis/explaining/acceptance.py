@@ -92,7 +92,7 @@ name would have to take its place."""
 SMALLEST_TOLD = 0.4
 """The same of what the signals tell without a fit: left out, it would be a riddle."""
 
-SMALLEST_BESIDE = 2.0
+SMALLEST_BESIDE = 1.9
 """The same beside a larger effect on the same signals, whose form a small one may make good."""
 
 EDDIES_AGAINST = 10.0

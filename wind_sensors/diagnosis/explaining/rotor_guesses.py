@@ -58,8 +58,8 @@ SHARP = 6.0
 within this share of it, as below: a fit of the whole signal would trade it for another gain."""
 
 APART = 5.0
-"""Bounces tell their delay if so many times as many intervals are shorter than a fifth of the usual
-one as between that and two fifths: a fit would trade it for another rate."""
+"""Bounces tell their delay if so many times as many intervals are shorter than three tenths of the
+usual one as between that and four tenths: a fit would trade it for another rate."""
 
 _RATE_THAT_TURNS = 1.5
 
@@ -143,13 +143,13 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         )
     out.extend(dead)
     if short > 0.004:
-        delay = float(np.median(interval[relative < 0.4]))
+        delay = float(np.mean(interval[relative < 0.4]))
         bounce = suggested(
             "extra_pulses", rotor.name,
-            bounce_probability=min(2.0 * short, 0.9),
+            bounce_probability=min(short / (1.0 - short), 0.9),
             bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
         )  # fmt: skip
-        shorter = float(np.mean(relative < 0.2))
+        shorter = float(np.mean(relative < 0.3))
         told = shorter > APART * (short - shorter)
         out.append(replace(bounce, held=frozenset({"bounce_delay"}) if told else frozenset()))
     scatter, once = comparison.measured.statistics[f"{rotor.name}/rotor_rate"][

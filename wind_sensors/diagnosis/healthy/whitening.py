@@ -12,7 +12,8 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.comparison import LOW_END, Comparison, Trust
 from wind_sensors.diagnosis.comparing.observation import Channel
-from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, chance_of_intervals
 from wind_sensors.diagnosis.healthy.baseline import Baseline, ChannelBaseline
 from wind_sensors.station.model import Station
 
@@ -67,15 +68,27 @@ def _trust(
         residual, known.low_ratio_at(coherence.frequency), low_end
     )
     mean_speed = float(np.mean(comparison.speed))
+    by_chance = _chance(comparison, simulated, channel)
     return Trust(
         slope=slope,
         deviation=np.sqrt(variance + SMALLEST_DEVIATION**2),
         statistics_mean=known.statistics_mean,
-        statistics_deviation=known.statistics_deviation_in(mean_speed),
+        statistics_deviation=np.hypot(known.statistics_deviation_in(mean_speed), by_chance),
         activity_deviation=known.activity_deviation(
             activity.sampling_variance(channel, mean_speed, comparison.grid)
         ),
     )
+
+
+def _chance(comparison: Comparison, simulated: Simulated, channel: Channel) -> FloatArray:
+    """Deviation of each statistic by which pulses chance has hit."""
+    drawn, seen = (s.statistics[channel.name] for s in (simulated, comparison.measured))
+    chance = np.zeros(drawn.size)
+    if channel.kind == "rotor_rate":
+        intervals = slice(BANDS, BANDS + INTERVALS)
+        edges = comparison.recording.pulses[channel.instrument].time.size
+        chance[intervals] = chance_of_intervals(drawn[intervals], seen[intervals], edges)
+    return chance
 
 
 @dataclass(frozen=True)

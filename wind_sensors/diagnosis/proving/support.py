@@ -68,11 +68,21 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
         sure = f.gain > (SURE_GAIN if alone else SURE_BESIDE_GAIN)
         if f.p > SHOWN_P and f.share < OWN_SHARE and not sure:
             return True
-    if not set.intersection(*reached):
+    if not set.intersection(*reached) or any(_is_counted(f) for f in own):
         return False
     brought = sum(f.gain for f in own)
     single = max(gain - (brought - f.gain) for f in own)
     return brought > MOST_SHARED * gain and single < MOST_ALONE * gain
+
+
+def _is_counted(finding: Finding) -> bool:
+    """Whether the raw signals show by themselves what chance does to them.
+
+    Pulses that bounce and a slow rotor undo each other in the mean, where alone either gains little
+    and both together much; the bounces are seen all the same.
+    """
+    by_itself = finding.located.region.kind == "statistic" and finding.p <= SHOWN_P
+    return by_itself and finding.term.effect.noisy
 
 
 def passes_unseen(findings: tuple[Finding, ...]) -> bool:

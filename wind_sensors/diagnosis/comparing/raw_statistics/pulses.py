@@ -73,6 +73,25 @@ def interval_statistics(
     )
 
 
+def chance_of_intervals(one: FloatArray, other: FloatArray, edges: int) -> FloatArray:
+    """How far `interval_statistics` of two records may differ by which edges chance has hit.
+
+    Of n edges of which chance doubles or drops the share p, p is known to sqrt(p (1 - p) / n), and
+    an interval that is one too short or too long moves the mean of its slot by as much. Only what
+    both records have is chance: intervals that one of them alone has are a difference.
+
+    Args:
+        one, other: Of the two.
+        edges: Of each.
+
+    Returns:
+        Standard deviation of each difference.
+    """
+    hit = min(float(np.minimum(one[:2], other[:2]).sum()), 1.0)
+    deviation = math.sqrt(2.0 * hit * (1.0 - hit) / max(edges, 1))
+    return np.full(INTERVALS, deviation)
+
+
 @compiled
 def _interval_statistics(
     time: FloatArray,
