@@ -1,9 +1,10 @@
-"""Wind of the open recordings before and after the diagnosis, against that of healthy ones.
+"""Wind of the shared recordings before and after the diagnosis, against that of healthy ones.
 
-Each open recording of the shared material is diagnosed with the healthy recordings of its station
-as baseline. Its wind is estimated with its own station file, with `station_corrected.yaml` and with
-the named physics on its own station file, and compared with the reference; the wind of the healthy
-recordings with their own station files says how close one can come. A sonic half a metre away
+Each open and each sealed recording of the shared material is diagnosed with the healthy recordings
+of its station as baseline. Its wind is estimated with its own station file, with
+`station_corrected.yaml` and with the named physics on its own station file, and compared with the
+reference; the wind of the healthy recordings with their own station files says how close one can
+come. A sonic half a metre away
 differs from the instruments also on a healthy day, the more so the stronger the gusts. Therefore
 differences are divided by the gusts of their own recording, and the fast part of them by what the
 reference's distance, path and noise make in the turbulence of the recording.
@@ -159,7 +160,7 @@ class Row:
 def station_rows(
     folder: Path, kept: Path, method: Method, again: bool, progress: Progress, task: TaskID
 ) -> tuple[list[Row], list[Row]]:
-    """Healthy and open recordings of one station."""
+    """Healthy recordings of one station, and the others."""
     healthy = [read_recording(f) for f in sorted(folder.glob("healthy-*"))]
     baseline = baseline_of(folder, healthy, kept, again)
     place = folder.name.removeprefix("station-")
@@ -169,7 +170,7 @@ def station_rows(
         well.append(Row(f"{place}/{recording.name}", "", own))
         progress.advance(task)
     ill = []
-    for path in sorted(folder.glob("open-*")):
+    for path in sorted((*folder.glob("open-*"), *folder.glob("sealed-*"))):
         recording = read_recording(path)
         stem = kept / f"{folder.name}-{path.name}"
         found, station, on_own = corrected(recording, baseline, stem, again)
@@ -234,7 +235,7 @@ def main() -> None:
         return
     options.output.mkdir(parents=True, exist_ok=True)
     methods: list[Method] = options.method or ["kalman", "inverse"]
-    total = sum(len(list(f.glob("healthy-*")) + list(f.glob("open-*"))) for f in folders)
+    total = sum(len(list(f.glob("*-*"))) for f in folders)
     again = options.again
     for method in methods:
         with Progress(console=Console(stderr=True), transient=True) as progress:

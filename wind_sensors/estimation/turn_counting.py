@@ -14,6 +14,9 @@ TimeArray = npt.NDArray[np.int64]
 
 _WITHIN_DEAD_TIME = 1.1
 """Allowance for slots of unequal width and for wind that changes between two edges."""
+_USUAL_CHANGE = 0.1
+"""Standard deviation of the logarithm of one interval over the one before. An edge more is taken
+for lost by chance where that is likelier than so large a change."""
 _FEW = 8
 """So many intervals tell the first rate."""
 _LONGEST_BOUNCE = 3.0
@@ -150,9 +153,17 @@ class TurnCounter:
         e = self._rotor.electronics
         if usual <= 0.0 or (e.dead_time == 0.0 and e.loss_probability == 0.0):
             return 1
-        slots = max(math.floor(since / usual + 0.5), 1)
+        most = max(math.floor(since / usual + 0.5), 1)
+        # The last of the edges that the dead time took fell into it.
+        slots = most
+        while slots > 1 and since * (slots - 1) > _WITHIN_DEAD_TIME * e.dead_time * slots:
+            slots -= 1
         if e.loss_probability == 0.0:
-            # The last of the lost edges fell into the dead time.
-            while slots > 1 and since * (slots - 1) > _WITHIN_DEAD_TIME * e.dead_time * slots:
-                slots -= 1
-        return slots
+            return slots
+        rare = -math.log(e.loss_probability)
+
+        def unlikely(passed: int) -> float:
+            changed = math.log(since / (passed * usual)) / _USUAL_CHANGE
+            return 0.5 * changed**2 + rare * (passed - slots)
+
+        return min(range(slots, most + 1), key=unlikely)

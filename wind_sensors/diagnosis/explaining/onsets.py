@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.explaining.intervals import (
     interval_gains,
     interval_of,
 )
+from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
     JOINT_TEMPLATES,
     Key,
@@ -318,6 +319,8 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
             continue
         interval = interval_of(comparison, *span.window)
         passing = replace(term, interval=interval)
+        if ruled_out(comparison, searcher.station, [*others, passing]):
+            continue
         trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
         trial = refined_interval(searcher, whitener, trial)
         always = fit(

@@ -7,9 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import headings
 from wind_sensors.station.model import Angle, Station
+
+SOONER = 0.97
+FEWEST_SOONER = 5
+"""A counter that stops being deaf shows so many intervals shorter than this share of its dead
+time."""
 
 FLOATS = 2.0
 """Form of a gap in which the reading may be anything."""
@@ -34,7 +39,27 @@ def ruled_out(comparison: Comparison, station: Station, terms: Sequence[Term]) -
         station: As commissioned.
         terms: The explanation.
     """
-    return any(_reads_in_its_gap(comparison, station, term, terms) for term in terms)
+    return any(
+        _reads_in_its_gap(comparison, station, term, terms) or _goes_on(comparison, term)
+        for term in terms
+    )
+
+
+def _goes_on(comparison: Comparison, term: Term) -> bool:
+    """Whether a counter is said to be deaf for a while, though its pulses never come sooner.
+
+    Args:
+        comparison: The recording.
+        term: Any effect; only a dead time that the pulses tell is asked.
+    """
+    if "dead_time" not in term.held or term.interval == ALWAYS:
+        return False
+    time = comparison.grid.seconds(comparison.recording.pulses[term.instrument].time)
+    since = time[1:] + comparison.drive.elapsed
+    begin, end = term.interval
+    outside = (since < begin) | (since > (np.inf if end is None else end))
+    sooner = np.diff(time) < SOONER * term.values["dead_time"]
+    return bool(np.count_nonzero(sooner & outside) < FEWEST_SOONER)
 
 
 def _reads_in_its_gap(

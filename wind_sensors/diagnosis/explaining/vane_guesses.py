@@ -20,6 +20,16 @@ FloatArray = npt.NDArray[np.float64]
 LONGEST_REPEAT = 4.0
 """A vane that repeats one reading for longer [s] in a wind that turns it is taken to be stuck."""
 
+SAME_VALUE = 1e-3
+"""Readings so close to each other are the same [deg]."""
+
+NARROWEST_HOLE, WIDEST_HOLE = 3, 60
+EMPTY = 0.03
+BESIDE_HOLE = 20
+LEAST_BESIDE_HOLE = 0.015
+"""A hole in a vane's readings is so many degrees wide, no degree of it has the second share of what
+usual degrees have, and so many degrees on either side have this share of all readings."""
+
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
 
@@ -101,9 +111,10 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
         low, high = float(common.min()), float(common.max())
         if common.size == 1:
             beside = [(low + 5.0 * side, 10.0) for side in (-1.0, 1.0)]
-            there = np.abs(np.degrees(delivered) - low) < 1e-3
+            there = np.abs(np.degrees(delivered) - low) < SAME_VALUE
             sectors = [_sector(comparison, channel, there), *([hole] if hole else beside)]
             out.extend(_gap(vane, *sector, 1, low) for sector in sectors)
+            out.extend(_told_gap(comparison, vane, low))
             out.extend(_gap(vane, *sector) for sector in sectors)
         else:
             width = high - low
@@ -113,6 +124,29 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
             if width < 90.0:
                 out.append(_gap(vane, centre, width))
     return out
+
+
+def _told_gap(comparison: Comparison, vane: str, value: float) -> list[Term]:
+    """A gap in which the vane reads one value, from the first to the last time that it does.
+
+    Args:
+        comparison: The recording.
+        vane: Its name.
+        value: What it reads there [deg].
+
+    Returns:
+        Nothing where other directions are missing in that time, too, or none are.
+    """
+    readings = comparison.recording.angles[vane]
+    told = np.isfinite(readings.angle)
+    degrees, time = np.degrees(readings.angle[told]), comparison.grid.seconds(readings.time[told])
+    (there,) = np.nonzero(np.abs(degrees - value) < SAME_VALUE)
+    begin, end = there[0], there[-1]
+    hole = _hole(degrees[begin : end + 1])
+    if hole is None:
+        return []
+    gap = replace(_gap(vane, *hole, 1, value), held=frozenset({"centre", "width", "reading"}))
+    return [replace(gap, interval=interval_of(comparison, float(time[begin]), float(time[end])))]
 
 
 def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
@@ -202,19 +236,16 @@ def _hole(degrees: FloatArray) -> tuple[float, float] | None:
     """Centre and width of a sector without readings between sectors with many [deg]."""
     counts, _ = np.histogram(np.mod(degrees, 360.0), bins=360, range=(0.0, 360.0))
     # A reading that comes again and again is no wind.
-    counts = np.minimum(counts, 5.0 * np.median(counts[counts > 0]))
-    beside = np.convolve(np.concatenate((counts[-20:], counts, counts[:20])), np.ones(20), "valid")
-    below, above = beside[:360], beside[21:381]
-    least = 0.015 * np.sum(counts)
-    empty = (counts < 0.03 * (below + above) / 40.0) & (below > least) & (above > least)
-    if not empty.any():
-        return None
-    doubled = np.concatenate((empty, empty))
-    best, run, at = 0, 0, 0
-    for k, is_empty in enumerate(doubled):
-        run = run + 1 if is_empty else 0
-        if run > best:
-            best, at = run, k
-    if best < 3 or best > 60:
-        return None
-    return float((at - 0.5 * best + 0.5) % 360.0), float(best)
+    usual = np.median(counts[counts > 0])
+    counts = np.minimum(counts, 5.0 * usual)
+    least = LEAST_BESIDE_HOLE * np.sum(counts)
+    round_twice = np.concatenate((counts, counts))
+    edges = np.diff(np.concatenate(([False], round_twice < EMPTY * usual, [False])).astype(int))
+    found: tuple[float, float] | None = None
+    for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        beside = (np.arange(begin - BESIDE_HOLE, begin), np.arange(end, end + BESIDE_HOLE))
+        peopled = all(np.sum(counts[np.mod(at, 360)]) > least for at in beside)
+        width = float(end - begin)
+        if peopled and NARROWEST_HOLE <= width <= WIDEST_HOLE and (not found or width > found[1]):
+            found = float((0.5 * (begin + end)) % 360.0), width
+    return found
