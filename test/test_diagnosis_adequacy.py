@@ -263,6 +263,25 @@ def test_two_effects_must_stand_out_one_by_one(
     assert made_up(found, comparison, 100.0) is verdict
 
 
+@pytest.mark.parametrize(
+    ("noisy", "kind", "verdict"),
+    [
+        ("extra_pulses", "statistic", False),
+        ("extra_pulses", "speed", True),
+        ("torque_asymmetry", "statistic", True),
+    ],
+)
+def test_what_chance_does_is_seen_beside_what_makes_it_good_in_the_mean(
+    noisy: str, kind: str, verdict: bool
+) -> None:
+    region = Region("cup/rotor_rate", kind, 0.0, 1.0, "anywhere")
+    bouncing = replace(
+        _finding(noisy, "cup", 1.0, 0.002), gain=100.0, located=Found(region, 50.0, 0.1, "m/s")
+    )
+    found = (replace(_finding(*OFFSET, 0.9, 0.002), gain=90.0), bouncing)
+    assert made_up(found, prepare(recorded(STATION, 65)), 100.0) is verdict
+
+
 @pytest.mark.parametrize(("other", "verdict"), [(LATE, False), (ASYMMETRY, True)])
 def test_alone_on_its_signals_an_effect_that_brings_much_stands_out_nowhere(
     other: tuple[str, str], verdict: bool

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.observation import Grid
+from wind_sensors.diagnosis.comparing.observing import BANDS
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
+    INTERVALS,
+    chance_of_intervals,
     interval_statistics,
     slot_intervals,
 )
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.effects.output import slot_values
+from wind_sensors.diagnosis.explaining.acceptance import only_makes_good
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
+from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Pulses
@@ -197,3 +204,67 @@ def test_slots_are_counted_anew_after_a_silence() -> None:
         silent = (whole > 150.0) & (whole < 210.0)
         silent[np.flatnonzero(silent)[-1] + 1 + np.arange(lost)] = True
         assert unevenness(whole[~silent]) == pytest.approx(unevenness(whole), rel=0.1)
+
+
+@pytest.mark.parametrize(("begins", "ruled"), [(0.0, True), (200.0, False)])
+def test_a_counter_that_is_deaf_throughout_is_not_said_to_become_so(
+    begins: float, ruled: bool
+) -> None:
+    deaf = catalogue()["missed_pulses"]
+    comparison = prepare(recorded(with_effect(STATION, deaf, "cup", DEAD, (begins, None)), 82))
+    term = Term(deaf, "cup", DEAD, (200.0, None), frozenset({"dead_time"}))
+    assert ruled_out(comparison, STATION, [term]) is ruled
+    assert not ruled_out(comparison, STATION, [replace(term, interval=ALWAYS)])
+    assert not ruled_out(comparison, STATION, [replace(term, held=frozenset())])
+
+
+@pytest.mark.parametrize(("width", "begins"), [(12.0, 0.0), (34.0, 0.0), (16.0, 250.0)])
+def test_readings_tell_where_a_gap_is_and_since_when(width: float, begins: float) -> None:
+    value = 190.0 - 0.5 * width
+    values = {"centre": 190.0, "width": width, "reading": value, "form": 1.0}
+    gap = catalogue()["potentiometer_gap"]
+    station = with_effect(STATION, gap, "vane", values, (begins, None))
+    comparison = prepare(recorded(station, 84, swing=0.8))
+    (told,) = (t for t in guesses_of(comparison, STATION)[("potentiometer_gap", "vane")] if t.held)
+    assert np.mod(told.values["centre"] - 190.0 + 180.0, 360.0) - 180.0 == pytest.approx(0, abs=1.0)
+    assert told.values["width"] == pytest.approx(width, abs=2.0)
+    assert np.mod(told.values["reading"] - value + 180.0, 360.0) == pytest.approx(180.0, abs=0.01)
+    assert told.interval[0] == pytest.approx(begins, abs=25.0)
+    assert told.interval[1] is None
+
+
+def test_what_chance_draws_differs_by_as_much_as_chance_says() -> None:
+    bouncing = catalogue()["extra_pulses"]
+    values = {"bounce_probability": 0.06, "bounce_delay": 0.0005}
+    seen = []
+    for seed in range(6):
+        comparison = prepare(recorded(with_effect(STATION, bouncing, "cup", values), seed))
+        seen.append(comparison.measured.statistics["cup/rotor_rate"][BANDS : BANDS + INTERVALS])
+    edges = comparison.recording.pulses["cup"].time.size
+    deviation = chance_of_intervals(seen[0], seen[1], edges)
+    short = np.array(seen)[:, 1]
+    assert np.std(short, ddof=1) < 3.0 * deviation[1] / np.sqrt(2.0)
+    assert np.std(short, ddof=1) > deviation[1] / np.sqrt(2.0) / 5.0
+    lost, doubled = np.array([0.06, *[0.0] * 5]), np.array([0.0, 0.06, *[0.0] * 4])
+    assert not np.any(chance_of_intervals(lost, doubled, edges))
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "mends"),
+    [
+        (("rotor_inertia", "cup", 1.5), ("calibration_drift", "cup", 1.1), True),
+        (("rotor_inertia", "cup", 1.8), ("calibration_drift", "cup", 1.1), False),
+        (("rotor_inertia", "cup", 1.5), ("vane_offset", "vane", 20.0), False),
+        (("rotor_inertia", "cup", 1.5), ("calibration_drift", "cup", 1.01), False),
+    ],
+)
+def test_what_is_small_beside_a_large_effect_on_the_same_signals_mends_its_form(
+    one: tuple[str, str, float], other: tuple[str, str, float], mends: bool
+) -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 85)), baseline(), catalogue(), {})
+    terms = []
+    for name, instrument, value in (one, other):
+        effect = catalogue()[name]
+        terms.append(Term(effect, instrument, {effect.parameters[0].name: value}))
+    assert only_makes_good(searcher, terms[0], terms) is mends
+    assert not only_makes_good(searcher, terms[0], terms[:1])

@@ -45,8 +45,9 @@ from wind_sensors.estimation.propeller_watch import PropellerWatch
 from wind_sensors.estimation.readings import NoseReader
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.site import with_site_covariance
+from wind_sensors.estimation.slot_places import slots_in_place
 from wind_sensors.estimation.smoother_kernel import smooth
-from wind_sensors.estimation.start import slots_in_place, start_filter
+from wind_sensors.estimation.start import start_filter
 from wind_sensors.estimation.timeline import Timeline
 from wind_sensors.estimation.turbulence_process import (
     UNRESOLVED_VARIANCE,

@@ -46,30 +46,6 @@ def _first_rate(blocks: list[Block], rotor: Cup | Propeller) -> tuple[float, flo
     return 2.0 * np.pi * rotor.calibration_distance * made / duration, 0.0
 
 
-def slots_in_place(errors: FloatArray, times: TimeArray) -> FloatArray:
-    """Places of the slots, turned so that the first recorded edge is slot 1.
-
-    The file counts slots from a mark on the disc, the recording from its first edge: of all turns
-    the one stands for which the rotor's rate changes least from edge to edge.
-
-    Args:
-        errors: Of each slot [slots], shape (n,).
-        times: First edges [ns], shape (m,).
-    """
-    if times.size < errors.size + 2:
-        return errors
-    taken = np.log(np.diff(times).astype(np.float64))
-    number = np.arange(1, times.size)
-    best, least = errors, np.inf
-    for turn in range(errors.size):
-        turned = np.roll(errors, turn)
-        width = 1.0 + turned[(number + 1) % errors.size] - turned[number % errors.size]
-        change = float(np.sum(np.square(np.diff(taken - np.log(width)))))
-        if change < least:
-            best, least = turned, change
-    return best
-
-
 def _array_wind(
     rotors: tuple[Cup | Propeller, ...], rates: list[tuple[float, float]]
 ) -> FloatArray:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.estimation.slot_places import SlotPlaces
 from wind_sensors.station.model import Rotor
 
 FloatArray = npt.NDArray[np.float64]
@@ -55,8 +56,8 @@ def loses_edges(rotor: Rotor) -> bool:
 class TurnCounter:
     """Turned angle at recorded edges, with lost edges restored and false ones left out.
 
-    Only what the station file states is undone: dead time, random losses, bounces, outages. The
-    number of slots between two edges follows from the rate before.
+    Only what the station file states is undone: dead time, random losses, bounces, outages, slots
+    out of their places. The number of slots between two edges follows from the rate before.
 
     Args:
         rotor: The rotor as it is at first.
@@ -70,6 +71,7 @@ class TurnCounter:
         self._slots = 0.0
         self._interval = 0.0
         self._bridge: tuple[int, float] | None = None
+        self._places = SlotPlaces()
 
     def count(self, rotor: Rotor, time: TimeArray) -> tuple[TimeArray, FloatArray]:
         """Edges that count, in order of time, with the angle turned since the start.
@@ -94,7 +96,7 @@ class TurnCounter:
                     else (int(time[0]) - before) * 1e-9
                 )
                 self._last, self._slots = int(time[-1]), float(numbers[-1])
-            return time, step * numbers
+            return time, step * (numbers + self._places.displaced(rotor, time, numbers))
         if self._interval == 0.0 and time.size > 1:
             first = np.diff(time[: _FEW + 1]) * 1e-9
             if rotor.electronics.bounce_probability > 0.0:
@@ -105,7 +107,8 @@ class TurnCounter:
         slots_at: list[float] = []
         for t in time.tolist():
             self._edge(t, times, slots_at)
-        return np.array(times, dtype=np.int64), step * np.array(slots_at, dtype=np.float64)
+        counted, numbers = np.array(times, dtype=np.int64), np.array(slots_at, dtype=np.float64)
+        return counted, step * (numbers + self._places.displaced(rotor, counted, numbers))
 
     def _edge(self, t: int, times: list[int], slots_at: list[float]) -> None:
         if self._last is None:

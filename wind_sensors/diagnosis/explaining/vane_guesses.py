@@ -127,7 +127,7 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
 
 
 def _told_gap(comparison: Comparison, vane: str, value: float) -> list[Term]:
-    """A gap in which the vane reads one value, from the first to the last time that it does.
+    """A gap in which the vane reads one value, for as long as it reads nothing else there.
 
     Args:
         comparison: The recording.
@@ -145,8 +145,13 @@ def _told_gap(comparison: Comparison, vane: str, value: float) -> list[Term]:
     hole = _hole(degrees[begin : end + 1])
     if hole is None:
         return []
+    away = np.mod(degrees - hole[0] + 180.0, 360.0) - 180.0
+    (inside,) = np.nonzero(np.abs(away) < 0.5 * hole[1] - 1.0)
+    before, after = inside[inside < begin], inside[inside > end]
+    begins = float(time[begin]) if before.size else 0.0
+    ends = float(time[end]) if after.size else np.inf
     gap = replace(_gap(vane, *hole, 1, value), held=frozenset({"centre", "width", "reading"}))
-    return [replace(gap, interval=interval_of(comparison, float(time[begin]), float(time[end])))]
+    return [replace(gap, interval=interval_of(comparison, begins, ends))]
 
 
 def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
