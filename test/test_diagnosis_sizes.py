@@ -20,6 +20,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     least_size,
     overlap,
 )
+from wind_sensors.diagnosis.explaining.bounds import without_spare
 from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, no_terms
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
@@ -362,3 +363,33 @@ def test_a_single_effect_that_is_left_of_two_has_to_explain_what_stands_out() ->
     assert leading_alone(searcher, slow, turned.terms).terms[0].key == turned.terms[0].key
     assert leading_alone(searcher, turned, slow.terms).terms[0].key == turned.terms[0].key
     assert leading_alone(searcher, turned, turned.terms) is turned
+
+
+@pytest.mark.parametrize(
+    ("place", "kept"),
+    [
+        ((0.3, -0.1, 2.5), {"dz"}),
+        ((1.5, -0.1, 2.5), {"dx", "dz"}),
+        ((0.3, -0.1, 0.5), {"dx", "dy", "dz"}),
+    ],
+)
+def test_what_a_recording_does_not_ask_for_is_left_as_stated(
+    place: tuple[float, float, float], kept: set[str]
+) -> None:
+    values = dict(zip(("dx", "dy", "dz"), place, strict=True))
+    lever = Term(catalogue()["lever_arm"], "platform", values)
+    offset = Term(catalogue()["vane_offset"], "vane", {"offset": 3.0})
+    found = Fit(
+        (offset, lever), 0.0, np.zeros(1), None, np.diag([0.01, *[0.3**2] * 3]), 0, 4
+    )  # fmt: skip
+    _, left = without_spare(found, 4.0)
+    assert {name for name, value in left.values.items() if value != 0.0} == kept
+    assert left.held == set(values) - kept
+
+
+def test_a_dead_time_is_reported_without_losses_that_nobody_sees() -> None:
+    dead = {"dead_time": 0.0075, "loss_probability": 0.0}
+    station = with_effect(STATION, catalogue()["missed_pulses"], "cup", dead)
+    (finding,) = diagnose(recorded(station, 82), baseline(), with_proof=False).findings
+    assert set(finding.parameters) == {"dead_time"}
+    assert finding.term.values["loss_probability"] == 0.0

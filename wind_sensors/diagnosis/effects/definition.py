@@ -36,6 +36,8 @@ class Parameter:
         free: Whether what drives the recording lets it be fitted; None: always.
         swing: Smallest change of the air's temperature, while the effect holds, that the parameter
             needs [K]; with less it keeps its healthy value.
+        spare: Whether the effect is often there without it: it keeps its healthy value where the
+            recording does not ask for another.
         value_from: The `fit`; the `signals`, which tell it better than a fit can; or several
             `forms` of the effect, each of which is tried as it is.
     """
@@ -50,6 +52,7 @@ class Parameter:
     step: float = 0.0
     wraps: float = 0.0
     swing: float = 0.0
+    spare: bool = False
     free: Callable[[Drive], bool] | None = None
     value_from: Literal["fit", "signals", "forms"] = "fit"
 

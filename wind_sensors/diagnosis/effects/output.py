@@ -55,8 +55,8 @@ MISSED_PULSES = Effect(
     region="high rotor rates; doubled pulse intervals",
     standing=0.0,
     parameters=(
-        Parameter("dead_time", "s", 0.0, 0.5, minimum=0.001, step=0.0005),
-        Parameter("loss_probability", "1", 0.0, 0.9, minimum=0.01, step=0.003),
+        Parameter("dead_time", "s", 0.0, 0.5, minimum=0.001, step=0.0005, spare=True),
+        Parameter("loss_probability", "1", 0.0, 0.9, minimum=0.01, step=0.003, spare=True),
     ),
     applies=_is_rotor,
     update=_missed,

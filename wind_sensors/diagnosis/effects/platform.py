@@ -167,7 +167,10 @@ LEVER_ARM = Effect(
     source="rigid-body kinematics",
     region="while the carrier rolls, pitches or turns",
     parameters=tuple(
-        Parameter(name, "m", -30.0, 30.0, minimum=0.5, step=0.1, starts=(-5.0, -2.0, 2.0, 5.0))
+        Parameter(
+            name, "m", -30.0, 30.0, minimum=0.5, step=0.1, starts=(-5.0, -2.0, 2.0, 5.0),
+            spare=True,
+        )
         for name in ("dx", "dy", "dz")
     ),
     applies=_is_platform,
@@ -221,11 +224,15 @@ HEADING_DEVIATION = Effect(
     source="compass deviation, coefficients A to E",
     region="with the carrier's heading",
     parameters=(
-        Parameter("constant", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
+        Parameter("constant", "deg", -45.0, 45.0, minimum=2.0, step=0.5, spare=True),
         Parameter("sine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
         Parameter("cosine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
-        Parameter("sine_2", "deg", -15.0, 15.0, minimum=2.0, step=0.5, free=_goes_round),
-        Parameter("cosine_2", "deg", -15.0, 15.0, minimum=2.0, step=0.5, free=_goes_round),
+        *(
+            Parameter(
+                name, "deg", -15.0, 15.0, minimum=2.0, step=0.5, spare=True, free=_goes_round
+            )
+            for name in ("sine_2", "cosine_2")
+        ),
     ),
     applies=_is_platform,
     update=_deviation,
@@ -264,11 +271,11 @@ FRAME_ERROR = Effect(
     source="REP-103",
     region="with the carrier's speed, or while it leans",
     parameters=(
-        Parameter("roll", "deg", -90.0, 90.0, minimum=6.0, step=0.5),
-        Parameter("pitch", "deg", -90.0, 90.0, minimum=6.0, step=0.5),
+        Parameter("roll", "deg", -90.0, 90.0, minimum=6.0, step=0.5, spare=True),
+        Parameter("pitch", "deg", -90.0, 90.0, minimum=6.0, step=0.5, spare=True),
         Parameter(
             "velocity_turn", "deg", -270.0, 270.0, minimum=6.0, step=1.0,
-            starts=(20.0, -20.0, 90.0, -90.0, 180.0),
+            starts=(20.0, -20.0, 90.0, -90.0, 180.0), spare=True,
         ),
     ),
     applies=_is_platform,

@@ -246,8 +246,8 @@ ANGULAR_RESPONSE = Effect(
     source="K14, eqs. (83), (84); J80, sec. 3.2",
     region="strong vertical or lateral turbulence",
     parameters=(
-        Parameter("change", "1", -3.0, 2.0, minimum=0.4, step=0.1),
-        Parameter("skewness", "1", -2.0, 2.0, minimum=0.1, step=0.03),
+        Parameter("change", "1", -3.0, 2.0, minimum=0.4, step=0.1, spare=True),
+        Parameter("skewness", "1", -2.0, 2.0, minimum=0.1, step=0.03, spare=True),
     ),
     applies=_is_rotor,
     update=_angular,

@@ -64,17 +64,56 @@ def without_idle(found: Fit, price: float) -> Term | None:
         found: A fit.
         price: What a further parameter costs.
     """
-    term = found.terms[-1]
+    number = len(found.terms) - 1
+    goes_with = frozenset(p.name for p in found.terms[-1].effect.parameters if p.swing > 0.0)
+    return _with_idle_held(found, number, goes_with, price)
+
+
+def without_spare(found: Fit, price: float) -> tuple[Term, ...]:
+    """The terms with what they are often there without held, where it does not pay for itself.
+
+    What a fit leaves in it is noise (a tenth of a metre, half a degree), which a corrected station
+    file would put into the wind. One of an effect's parameters stays.
+
+    Args:
+        found: A fit.
+        price: What a further parameter costs.
+    """
+    return tuple(
+        _with_idle_held(
+            found, k, frozenset(p.name for p in term.effect.parameters if p.spare), price
+        )
+        or term
+        for k, term in enumerate(found.terms)
+    )
+
+
+def _with_idle_held(
+    found: Fit, number: int, may_rest: frozenset[str], price: float
+) -> Term | None:
+    """One term with some parameters held that do not pay for themselves; None: all do.
+
+    Args:
+        found: A fit.
+        number: Of the term.
+        may_rest: Names of those parameters that may be held.
+        price: What a further parameter costs.
+    """
+    term = found.terms[number]
     parameters = term.effect.parameters
-    variances = found.covariance.diagonal()[-len(parameters) :]
+    first = sum(len(t.effect.parameters) for t in found.terms[:number])
+    variances = found.covariance.diagonal()[first : first + len(parameters)]
     idle = {
         p.name: p.healthy
         for p, variance in zip(parameters, variances, strict=True)
-        if p.swing > 0.0
+        if p.name in may_rest
         and p.healthy is not None
         and term.fits(p)
         and (term.values[p.name] - p.healthy) ** 2 < price * variance
     }
-    if not idle:
+    stays = any(
+        p.graded and p.name not in idle and term.values[p.name] != p.healthy for p in parameters
+    )
+    if not idle or not stays:
         return None
     return replace(term, values={**term.values, **idle}, held=term.held | frozenset(idle))

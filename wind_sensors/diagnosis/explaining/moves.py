@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     times_beside,
     too_small,
 )
+from wind_sensors.diagnosis.explaining.bounds import without_spare
 from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Judged,
@@ -40,7 +41,7 @@ from wind_sensors.diagnosis.explaining.fitting import (
     planted,
     without_term,
 )
-from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER, Searcher
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 MERGE_CANDIDATES = 8
@@ -149,6 +150,21 @@ def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         if total(nothing) - total(current) < needed:
             return nothing
     return current
+
+
+def spared(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
+    """The fit without those shares of its effects that the recording does not ask for.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+    """
+    terms = without_spare(current, PENALTY_PER_FURTHER_PARAMETER)
+    if terms == current.terms:
+        return current
+    fewer = fit(whitener, searcher.station, terms, searcher.bank.without)
+    return fewer if total(fewer) < total(current) else current
 
 
 def _simpler(searcher: Searcher, terms: Sequence[Term]) -> list[list[Term]]:

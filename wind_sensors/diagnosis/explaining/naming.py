@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.explaining.moves import (
     merged,
     pruned,
     simplified,
+    spared,
     swapped,
 )
 from wind_sensors.diagnosis.explaining.onsets import with_interval
@@ -256,6 +257,8 @@ def _settled(
     current = simplified(searcher, whitener, seen_in(whitener, current))
     if current.terms:
         current = with_interval(searcher, current)
+        whitener = searcher.whitener(current.simulated)
+        current = spared(searcher, whitener, seen_in(whitener, current))
         whitener = searcher.whitener(current.simulated)
         current = seen_in(whitener, current)
     nothing = whitener.of(searcher.bank.without)

@@ -14,6 +14,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import SlotIntervals
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, suggested
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
+from wind_sensors.diagnosis.explaining.ruled_out import comes_sooner
 from wind_sensors.station.model import Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -224,6 +225,10 @@ def _dead_times(
         return []
     _, shortest, holds = best
     told = _is_sharp(np.concatenate(found[0]), shortest)
+    since = recorded[0] + comparison.drive.elapsed
+    if told and not comes_sooner(since, recorded[1], shortest, holds):
+        # In a lull nothing comes soon: that the counter hears again there is not seen.
+        holds = ALWAYS
     return [
         replace(
             suggested(

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import headings
 from wind_sensors.station.model import Angle, Station
+
+FloatArray = npt.NDArray[np.float64]
 
 SOONER = 0.97
 FEWEST_SOONER = 5
@@ -56,10 +59,23 @@ def _goes_on(comparison: Comparison, term: Term) -> bool:
         return False
     time = comparison.grid.seconds(comparison.recording.pulses[term.instrument].time)
     since = time[1:] + comparison.drive.elapsed
-    begin, end = term.interval
+    return not comes_sooner(since, np.diff(time), term.values["dead_time"], term.interval)
+
+
+def comes_sooner(
+    since: FloatArray, intervals: FloatArray, dead_time: float, interval: Interval
+) -> bool:
+    """Whether pulses come sooner than a dead time allows, outside the time in which it holds.
+
+    Args:
+        since: End of each interval between pulses [s since the start of the recording].
+        intervals: Their lengths [s].
+        dead_time: [s]
+        interval: In which it is said to hold.
+    """
+    begin, end = interval
     outside = (since < begin) | (since > (np.inf if end is None else end))
-    sooner = np.diff(time) < SOONER * term.values["dead_time"]
-    return bool(np.count_nonzero(sooner & outside) < FEWEST_SOONER)
+    return bool(np.count_nonzero(outside & (intervals < SOONER * dead_time)) >= FEWEST_SOONER)
 
 
 def _reads_in_its_gap(
