@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -17,6 +18,7 @@ from typing import Any
 
 from rich.progress import track
 
+import wind_sensors
 from proving_ground.sealing.seal import HEALTHY, MANIFEST, RECORDINGS
 from wind_sensors import __version__
 from wind_sensors.errors import UserError
@@ -42,9 +44,20 @@ class Run:
     memory: float
 
 
+def fingerprint(package: Path) -> str:
+    """Of a package's Python files: the same for a checkout and what was installed from it."""
+    digest = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        digest.update(file.relative_to(package).as_posix().encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
 def program_version() -> dict[str, Any]:
-    """What diagnoses: version, the commit of a checkout (with + where files differ from it), the
-    day, and the processors of the machine."""
+    """What diagnoses: version, the commit of a checkout (with + where files differ from it), a
+    fingerprint of its files, the day, and the processors of the machine.
+
+    An installed program knows no commit: which one it is the fingerprint tells.
+    """
     root = Path(__file__).resolve().parents[2]
 
     def git(*words: str) -> str:
@@ -57,6 +70,7 @@ def program_version() -> dict[str, Any]:
     changed = "+" if commit and git("status", "--porcelain", "--", "wind_sensors") else ""
     return {
         "version": f"{commit}{changed}" or __version__,
+        "source": fingerprint(Path(wind_sensors.__file__).parent),
         "day": time.strftime("%Y-%m-%d", time.gmtime()),
         "processors": os.cpu_count() or 1,
     }
