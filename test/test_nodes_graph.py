@@ -47,6 +47,7 @@ class LiveRun:
     def __init__(
         self, graph: Graph, folder: Path, station: str, *, waits: bool = False, **simulation: Any
     ) -> None:
+        self._graph = graph
         self.settings = EstimatorSettings(reordering_window=1.0 if waits else 0.2)
         listener = graph.listener()
         self.wind = graph.listen(listener, TwistWithCovarianceStamped, "/wind")
@@ -111,6 +112,7 @@ class LiveRun:
     def assert_live_equals_offline(self) -> None:
         """The bag gives the numbers that went over DDS, to the last bit."""
         offline = process(self.recording, self.settings)
+        self._graph.spin(lambda: len(self.wind) >= offline.time.size)
         time, velocity, covariance = stamps_and_velocities(self.wind)
         assert len(time) > 0.9 * DURATION * self.settings.output_rate
         np.testing.assert_array_equal(time, offline.time)
