@@ -4,10 +4,10 @@ Each open and each sealed recording of the shared material is diagnosed with the
 of its station as baseline. Its wind is estimated with its own station file, with
 `station_corrected.yaml` and with the named physics on its own station file, and compared with the
 reference; the wind of the healthy recordings with their own station files says how close one can
-come. A sonic half a metre away
-differs from the instruments also on a healthy day, the more so the stronger the gusts. Therefore
-differences are divided by the gusts of their own recording, and the fast part of them by what the
-reference's distance, path and noise make in the turbulence of the recording.
+come. A sonic half a metre away differs from the instruments also on a healthy day, the more so the
+stronger the gusts. Therefore differences are divided by the gusts of their own recording, and the
+fast part of them by what the reference's distance, path and noise make in the turbulence of the
+recording.
 
 Run: python benchmarks/corrected_wind.py -o build/corrected_wind
 Diagnoses and baselines are kept there; `--again` makes them anew.

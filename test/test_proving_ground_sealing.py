@@ -24,7 +24,7 @@ from proving_ground.sealing.cipher import commitment, decrypt, encrypt, new_key
 from proving_ground.sealing.opening import judge_all, judge_said, open_answers, score
 from proving_ground.sealing.seal import ANSWERS, MANIFEST, RECORDINGS, Sealed, seal
 from proving_ground.sealing.strata import SHARES, SIZES, counts, make_plan
-from proving_ground.sealing.trial import run_all
+from proving_ground.sealing.trial import fingerprint, run_all
 from wind_sensors.errors import UserError
 
 KEY = bytes(range(32))
@@ -138,6 +138,20 @@ def test_another_program_answers_beside_the_first(sealed: Sealed, tmp_path: Path
     assert (now.name, now.named) == (name, ("icing",))
     earlier = judge_said(sealed.folder, open_answers(sealed.folder, KEY))
     assert all(j.named == ("vane_offset",) for j in earlier)
+
+
+def test_a_fingerprint_tells_programs_apart_wherever_they_lie(tmp_path: Path) -> None:
+    for place, line in (("checkout", "a = 1"), ("installed", "a = 1"), ("later", "a = 2")):
+        (tmp_path / place / "room").mkdir(parents=True)
+        (tmp_path / place / "room" / "part.py").write_text(line)
+    (tmp_path / "installed" / "room" / "part.cpython-311.pyc").write_bytes(b"compiled")
+    checkout, installed, later = (
+        fingerprint(tmp_path / p) for p in ("checkout", "installed", "later")
+    )
+    assert checkout == installed
+    assert checkout != later
+    (tmp_path / "later" / "room" / "part.py").rename(tmp_path / "later" / "room" / "other.py")
+    assert fingerprint(tmp_path / "later") != later
 
 
 def test_only_what_is_answered_differently_is_compared() -> None:

@@ -202,8 +202,7 @@ class KalmanCore:
             errors = rotor.electronics.slot_errors
             if errors and len(errors) == self.filter.slots[i]:
                 times = np.concatenate([b.pulses[rotor.name].time for b in blocks])
-                centred = np.array(errors) - np.mean(errors)
-                self.filter.slot_error[i, : len(errors)] = slots_in_place(centred, times)
+                self.filter.slot_error[i, : len(errors)] = slots_in_place(errors, times)
 
     def _events(self, block: Block) -> Events:
         """Everything that happens in a block, in the one order that all runs share."""

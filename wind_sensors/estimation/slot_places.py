@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -44,22 +46,22 @@ class SlotPlaces:
             enough = _TURNS_TO_PLACE * len(errors)
             if self._times.size < enough:
                 return np.zeros(time.size)
-            centred = np.array(errors) - np.mean(errors)
-            self._placed = slots_in_place(centred, self._times)
+            self._placed = slots_in_place(errors, self._times)
         place = np.rint(number).astype(np.int64) - self._first + 1
         return self._placed[np.mod(place, len(errors))]
 
 
-def slots_in_place(errors: FloatArray, times: TimeArray) -> FloatArray:
-    """Places of the slots, turned so that the first recorded edge is slot 1.
+def slots_in_place(stated: Sequence[float], times: TimeArray) -> FloatArray:
+    """Errors of the slots without their mean, turned so that the first recorded edge is slot 1.
 
     The file counts slots from a mark on the disc, the recording from its first edge: of all turns
     the one stands for which the rotor's rate changes least from edge to edge.
 
     Args:
-        errors: Of each slot [slots], shape (n,).
+        stated: Error of each slot [slots], n of them.
         times: First edges [ns], shape (m,).
     """
+    errors: FloatArray = np.asarray(stated, dtype=np.float64) - np.mean(stated)
     if times.size < errors.size + 2:
         return errors
     taken = np.log(np.diff(times).astype(np.float64))
