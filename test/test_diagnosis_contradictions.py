@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving import contradictions
 from wind_sensors.diagnosis.proving.contradictions import (
+    drop_by_own_delays,
     goes_with_speed,
     is_discordant,
     is_uneven,
@@ -129,6 +130,26 @@ def test_a_delay_that_grows_while_it_lasts_is_no_latency(
     slow = Term(catalogue()["rotor_inertia"], "cup", {"inertia_factor": 1.1})
     apart = replace(naming, fit=replace(naming.fit, terms=(*naming.fit.terms, slow)))
     assert varies(apart, STATION) is growing
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "begun", "drifts"),
+    [
+        ("timestamp_latency", {"latency": 1.2}, (120.0, None), False),
+        ("clock_drift", {"drift": 6000.0}, ALWAYS, True),
+    ],
+)
+def test_long_delays_are_compared_part_by_part(
+    effect: str, values: dict[str, float], begun: Interval, drifts: bool
+) -> None:
+    # Of delays that long a small change of size says nothing: quick eddies are out of step.
+    searcher, null = searched(effect, "vane", values, begun)
+    late = Term(catalogue()["timestamp_latency"], "vane", {"latency": 1.2}, (120.0, None))
+    naming = named(searcher, null, late)
+    assert naming.gain > 40.0
+    drop = drop_by_own_delays(naming, STATION, naming.fit.terms[0])
+    assert (drop > 0.3 * naming.gain) is drifts
+    assert varies(naming, STATION) is drifts
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,13 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.healthy.whitening import trust_of, whitener_of
-from wind_sensors.diagnosis.proving.held_out import LEAST_CONTRAST, block_masks, wind_masks
+from wind_sensors.diagnosis.proving.held_out import (
+    BLOCKS,
+    LEAST_CONTRAST,
+    block_masks,
+    blocks_for,
+    wind_masks,
+)
 from wind_sensors.diagnosis.proving.proof import Proof, prove
 from wind_sensors.station.signals import Recording
 
@@ -78,3 +84,14 @@ def test_blocks_are_parted_by_their_wind_where_it_changes() -> None:
     assert masks is not None
     calm, windy = (float(np.average(comparison.speed, weights=m)) for m in masks)
     assert windy > LEAST_CONTRAST * calm
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "times"), [(0.0, 1.0, 1), (0.43, 0.5, 2), (0.43, 0.46, 4), (0.43, 0.4301, 4)]
+)
+def test_what_acts_for_a_short_while_is_proved_in_shorter_blocks(
+    begin: float, end: float, times: int
+) -> None:
+    at = np.linspace(0.0, 1.0, 4000)
+    acting = ((at >= begin) & (at <= end)).astype(float)
+    assert blocks_for([np.ones(4000), acting]) == times * BLOCKS

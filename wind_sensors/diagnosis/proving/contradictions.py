@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +38,10 @@ share of the gain."""
 
 CLOCK_VARIES_SHARE = 0.1
 """A delay's share may be larger: which eddies a reference shares with an instrument changes."""
+
+DELAYS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
+"""In each part of the record a delay is tried so many times as long. Where it is wrong by half a
+second its signature says nothing: quick eddies are out of step."""
 
 AT_A_JUMP = 2.0
 """Where a clock's stamps jump, so many seconds say nothing: pulses on either side share a bin."""
@@ -168,6 +173,8 @@ def varies(naming: Naming, station: Station) -> bool:
         large = share
         if term.effect.entrance == "clock":
             large = CLOCK_VARIES_SHARE * naming.gain
+            if drop_by_own_delays(naming, station, term) > max(VARIES, large):
+                return True
             begin, end = begin + AT_A_JUMP, end - AT_A_JUMP
         cuts = np.linspace(begin, end, PARTS + 1)
         cells = cell_signatures(comparison, without, naming.fit.simulated, null.trust, cuts)
@@ -180,6 +187,38 @@ def varies(naming: Naming, station: Station) -> bool:
         if _drop_by_growth(cells, left) > max(GROWS, GROWS_SHARE * naming.gain):
             return True
     return False
+
+
+def drop_by_own_delays(naming: Naming, station: Station, term: Term) -> float:
+    """Drop of the cost if each part of the record had a delay of its own, nought among them.
+
+    Also where it is said not to hold: a clock that drifts is a delay that begins in the middle.
+
+    Args:
+        naming: The explanation.
+        station: As commissioned.
+        term: A delay, one of its effects.
+    """
+    comparison = naming.adequate.comparison
+    costs = [_costs_in_parts(naming, naming.fit.simulated)]
+    for times in DELAYS:
+        other = replace(term, values=term.effect.scaled(term.values, times), interval=ALWAYS)
+        terms = [other if t is term else t for t in naming.fit.terms]
+        simulated = comparison.possible(planted(station, terms))
+        if simulated is not None:
+            costs.append(_costs_in_parts(naming, simulated))
+    return float(np.sum(costs[0] - np.min(costs, axis=0)))
+
+
+def _costs_in_parts(naming: Naming, simulated: Simulated) -> FloatArray:
+    """Cost of the series in each part of the record, shape (parts,)."""
+    comparison = naming.adequate.comparison
+    n = comparison.coefficients
+    white = np.zeros((len(comparison.channels), comparison.grid.n))
+    left = naming.adequate.of(simulated)
+    white[:, :n] = left[: n * len(comparison.channels)].reshape(-1, n)
+    squares = np.sum([spectra.from_cosine(each) ** 2 for each in white], axis=0)
+    return np.array([part.sum() for part in np.array_split(squares, PARTS)])
 
 
 def _drop_by_growth(cells: FloatArray, left: FloatArray) -> float:

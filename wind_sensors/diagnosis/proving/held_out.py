@@ -18,7 +18,13 @@ from wind_sensors.station.model import Station
 FloatArray = npt.NDArray[np.float64]
 
 BLOCKS = 12
-"""The record is cut into so many blocks."""
+"""The record is cut into so many blocks,"""
+
+FINEST = 4
+LEAST_IN_A_HALF = 0.15
+"""or up to so many times as many, until every other one holds this share of what each effect
+changes: a vane that is in its gap for one minute cannot tell, in the minutes without it, what the
+gap reads."""
 
 GAP = 4.0
 """Between a fitted and a scored block [s]."""
@@ -37,15 +43,31 @@ units; of white noise it were 1."""
 _RAMP = 2.0
 
 
-def block_masks(comparison: Comparison) -> tuple[FloatArray, FloatArray]:
+def blocks_for(acting: Sequence[FloatArray]) -> int:
+    """Into how many blocks a record is cut to prove effects of which some act for a short while.
+
+    Args:
+        acting: Squares of what each effect changes in each bin, shape (n,) each.
+    """
+    blocks = BLOCKS
+    while blocks < FINEST * BLOCKS:
+        odd = _block_numbers(acting[0].size, blocks) % 2 == 1
+        shares = [float(one[odd].sum()) / max(float(one.sum()), 1e-30) for one in acting]
+        if all(LEAST_IN_A_HALF < share < 1.0 - LEAST_IN_A_HALF for share in shares):
+            return blocks
+        blocks *= 2
+    return blocks
+
+
+def block_masks(comparison: Comparison, blocks: int = BLOCKS) -> tuple[FloatArray, FloatArray]:
     """Two sets of blocks with gaps between them, with soft edges."""
-    odd = np.arange(BLOCKS) % 2 == 1
+    odd = np.arange(blocks) % 2 == 1
     return _mask_of(comparison, ~odd), _mask_of(comparison, odd)
 
 
 def wind_masks(comparison: Comparison) -> tuple[FloatArray, FloatArray] | None:
     """The calmer half of the blocks and the windier one; None: they are too much alike."""
-    number = _block_numbers(comparison)
+    number = _block_numbers(comparison.grid.n, BLOCKS)
     speed = np.bincount(number, comparison.speed, BLOCKS) / np.bincount(number, minlength=BLOCKS)
     windy = speed > np.median(speed)
     if np.mean(speed[windy]) < LEAST_CONTRAST * np.mean(speed[~windy]):
@@ -53,18 +75,18 @@ def wind_masks(comparison: Comparison) -> tuple[FloatArray, FloatArray] | None:
     return _mask_of(comparison, ~windy), _mask_of(comparison, windy)
 
 
-def _block_numbers(comparison: Comparison) -> npt.NDArray[np.intp]:
-    bins = comparison.grid.n
-    return np.minimum((np.arange(bins) * BLOCKS) // bins, BLOCKS - 1)
+def _block_numbers(bins: int, blocks: int) -> npt.NDArray[np.intp]:
+    return np.minimum((np.arange(bins) * blocks) // bins, blocks - 1)
 
 
 def _mask_of(comparison: Comparison, chosen: npt.NDArray[np.bool_]) -> FloatArray:
     """Weights of the bins in the chosen blocks, which have soft edges."""
-    width = comparison.grid.n * comparison.grid.dt / BLOCKS
+    blocks = chosen.size
+    width = comparison.grid.n * comparison.grid.dt / blocks
     within = np.mod(comparison.grid.centres, width)
     edge = np.minimum(within, width - within) - 0.5 * GAP
     soft = 0.5 - 0.5 * np.cos(np.pi * np.clip(edge / _RAMP, 0.0, 1.0))
-    return np.where(chosen[_block_numbers(comparison)], soft, 0.0)
+    return np.where(chosen[_block_numbers(comparison.grid.n, blocks)], soft, 0.0)
 
 
 @dataclass(frozen=True)
@@ -74,10 +96,12 @@ class Side:
     Attributes:
         whitener: The noise-only null within them.
         healthy: The simulation of the station as commissioned, seen there.
+        blocks: How many the record has, of those with them and of the others.
     """
 
     whitener: Whitener
     healthy: Simulated
+    blocks: int = BLOCKS
 
     @property
     def before(self) -> FloatArray:
@@ -85,13 +109,16 @@ class Side:
         return self.whitener.of(self.healthy)
 
 
-def side_of(whitener: Whitener, station: Station, mask: FloatArray) -> Side:
+def side_of(
+    whitener: Whitener, station: Station, mask: FloatArray, blocks: int = BLOCKS
+) -> Side:
     """The blocks of a mask.
 
     Args:
         whitener: The null of the whole record.
         station: As commissioned.
         mask: Weights of the bins, shape (n,).
+        blocks: Into how many the record is cut.
     """
     share = float(np.mean(mask**2))
     trust: dict[str, Trust] = {}
@@ -103,7 +130,7 @@ def side_of(whitener: Whitener, station: Station, mask: FloatArray) -> Side:
             statistics_deviation=t.statistics_deviation / np.sqrt(max(share, 0.1)),
         )
     comparison = whitener.comparison.within(mask)
-    return Side(unstanding(comparison, trust), comparison.simulate(station))
+    return Side(unstanding(comparison, trust), comparison.simulate(station), blocks)
 
 
 def curves(side: Side, degree: int, over: Sequence[FloatArray]) -> FloatArray:
@@ -211,8 +238,8 @@ def scored(
         floor: Its cost.
         without: The residual without what was fitted; None: of all that is compared.
     """
-    before = _block_costs(scoring.whitener, scoring.before if without is None else without)
-    after = _block_costs(scoring.whitener, vector)
+    before = _block_costs(scoring, scoring.before if without is None else without)
+    after = _block_costs(scoring, vector)
     used = np.append(before[:-1] > 1e-9, True)
     return Fold(before[used], after[used], floor, vector, fitted)
 
@@ -237,17 +264,17 @@ def removed(
     return (before - after) / excess if excess > 0.0 else 0.0
 
 
-def _block_costs(whitener: Whitener, vector: FloatArray) -> FloatArray:
+def _block_costs(side: Side, vector: FloatArray) -> FloatArray:
     """Cost of the series in each block, then that of the statistics."""
-    comparison = whitener.comparison
+    comparison = side.whitener.comparison
     n, bins = comparison.coefficients, comparison.grid.n
-    costs = np.zeros(BLOCKS + 1)
-    number = _block_numbers(comparison)
+    costs = np.zeros(side.blocks + 1)
+    number = _block_numbers(bins, side.blocks)
     place = 0
     for _ in comparison.channels:
         full = np.zeros(bins)
         full[:n] = vector[place : place + n]
-        costs[:-1] += np.bincount(number, spectra.from_cosine(full) ** 2, BLOCKS)
+        costs[:-1] += np.bincount(number, spectra.from_cosine(full) ** 2, side.blocks)
         place += n
     costs[-1] = np.sum(vector[place:] ** 2)
     return costs

@@ -44,6 +44,7 @@ from wind_sensors.diagnosis.proving.findings import (
     findings_of,
 )
 from wind_sensors.diagnosis.proving.support import (
+    UNSEEN_NOISY_GAIN,
     borne_out,
     determined,
     made_up,
@@ -216,14 +217,16 @@ def _upheld(
 ) -> tuple[Verdict, tuple[Finding, ...], str]:
     """Verdict and findings after what speaks against them, and what does, for people.
 
-    What was only said of a part of the record, and is withdrawn, leaves nothing if the recording
-    shows no more than healthy ones do: of the many intervals some fit the swings of a healthy vane.
+    What was only said of a part of the record, brought little and is withdrawn, leaves nothing if
+    the recording shows no more than healthy ones do: of the many intervals some fit the swings of a
+    healthy vane.
     """
     if not findings:
         return verdict, (), ""
     names = " and ".join(t.effect.name for t in naming.fit.terms)
     passing = any(t.interval != ALWAYS for t in naming.fit.terms)
-    left: Verdict = "unknown" if structured or not passing else "none"
+    something = structured or not passing or naming.gain > UNSEEN_NOISY_GAIN
+    left: Verdict = "unknown" if something else "none"
     if not borne_out(findings):
         left = left if stands_out(findings) else "none"
         objection = "blocks that were not fitted do not bear it out"

@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.proving.held_out import (
     Fold,
     Side,
     block_masks,
+    blocks_for,
     curves,
     fold_of,
     least_left,
@@ -96,7 +97,9 @@ def prove(
         placebo: The next-best explanation.
         seed: Of the block bootstrap.
     """
-    even, odd = (side_of(whitener, station, m) for m in block_masks(whitener.comparison))
+    blocks = blocks_for([_acting(whitener, station, terms, term) for term in terms])
+    masks = block_masks(whitener.comparison, blocks)
+    even, odd = (side_of(whitener, station, mask, blocks) for mask in masks)
     ways = ((even, odd), (odd, even))
     folds = [fold_of(fitting, scoring, station, terms) for fitting, scoring in ways]
     own = _reached(whitener, terms)
@@ -128,6 +131,21 @@ def prove(
         ),
         own_removed=removed([of_part(f, *way, own) for f, way in zip(folds, ways, strict=True)]),
     )
+
+
+def _acting(
+    whitener: Whitener, station: Station, terms: Sequence[Term], term: Term
+) -> FloatArray:
+    """Squares of what one of several effects changes in each bin, in units of noise, shape (n,)."""
+    comparison = whitener.comparison
+    others = planted(station, [t for t in terms if t is not term])
+    after = comparison.simulate(planted(station, terms))
+    before = comparison.possible(others) or comparison.simulate(station)
+    squares = np.zeros(comparison.grid.n)
+    for channel in comparison.channels:
+        noise = float(np.median(whitener.trust[channel.name].deviation))
+        squares += ((after.series[channel.name] - before.series[channel.name]) / noise) ** 2
+    return squares
 
 
 def _reached(whitener: Whitener, terms: Sequence[Term]) -> FloatArray:
