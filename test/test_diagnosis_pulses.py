@@ -218,6 +218,31 @@ def test_a_counter_that_is_deaf_throughout_is_not_said_to_become_so(
     assert not ruled_out(comparison, STATION, [replace(term, held=frozenset())])
 
 
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("bearing_friction", {"friction_speed": 2.5, "temperature_coefficient": 0.0}),
+        ("stuck_sensor", {"start": 100.0, "stop": 200.0, "reading": 0.0, "known": 0.0}),
+        ("missed_pulses", {"dead_time": 0.0, "loss_probability": 0.9}),
+    ],
+)
+def test_pulses_that_come_soon_or_not_at_all_were_not_lost_one_by_one(
+    effect: str, values: dict[str, float]
+) -> None:
+    station = with_effect(STATION, catalogue()[effect], "cup", values)
+    comparison = prepare(recorded(station, 82))
+    lost = catalogue()["missed_pulses"]
+    usual = float(np.median(np.diff(comparison.recording.pulses["cup"].time))) * 1e-9
+    deaf = Term(lost, "cup", {"dead_time": 1.5 * usual, "loss_probability": 0.0})
+    seldom = Term(lost, "cup", {"dead_time": 0.0, "loss_probability": 0.9})
+    silent = effect == "stuck_sensor"
+    assert ruled_out(comparison, STATION, [deaf])
+    assert ruled_out(comparison, STATION, [seldom]) is silent
+    # Something else may have silenced it.
+    stuck = Term(catalogue()["stuck_sensor"], "cup", {"start": 100.0, "stop": 200.0})
+    assert not ruled_out(comparison, STATION, [seldom, stuck])
+
+
 @pytest.mark.parametrize(("width", "begins"), [(12.0, 0.0), (34.0, 0.0), (16.0, 250.0)])
 def test_readings_tell_where_a_gap_is_and_since_when(width: float, begins: float) -> None:
     value = 190.0 - 0.5 * width

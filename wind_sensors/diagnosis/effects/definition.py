@@ -110,6 +110,8 @@ class Effect:
         unmistakable: The signals that tell its values tell that it is this effect, too. Silence
             they tell, but not whether the sensor or its bearing is stuck; uneven intervals, but not
             whether the disc or a cup makes them.
+        loose_statistics: Statistics of the raw signals, by their labels, in which its form is not
+            certain: what it leaves there says little against it.
         stirs: It brings eddies of its own where it acts, of which the reference knows nothing.
         needs: Data without which it cannot be seen.
         size: From the values, size in units of the smallest size worth reporting; None takes
@@ -139,6 +141,7 @@ class Effect:
     sticks: Callable[[Values], bool] | None = None
     unmistakable: bool = False
     stirs: bool = False
+    loose_statistics: frozenset[str] = frozenset()
     standing: float = 0.1
     standing_in_calm: float = 0.0
     needs: tuple[str, ...] = ()

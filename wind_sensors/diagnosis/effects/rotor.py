@@ -216,6 +216,8 @@ DAMAGED_CUP = Effect(
     contains=frozenset({"calibration_drift"}),
     region="once per revolution, locked to the wind's direction; a lower calibration",
     standing=0.0,
+    # How much of it comes twice per turn depends on the cup's shape and its speed in the wind.
+    loose_statistics=frozenset({"beat of the pulses with the wind, twice per turn"}),
     parameters=(
         Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.02, step=0.005, starts=(0.05,)),
         Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.02, starts=(0.97,)),

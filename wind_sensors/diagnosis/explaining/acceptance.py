@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
 )
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
+from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
@@ -146,6 +147,8 @@ def brought(
     newest = candidate.fit.terms[-1]
     comparison = searcher.comparison
     if not plausible(candidate.fit):
+        return -np.inf
+    if ruled_out(comparison, searcher.station, candidate.fit.terms):
         return -np.inf
     if is_a_way_of_the_wind(comparison, newest, current.simulated):
         return -np.inf

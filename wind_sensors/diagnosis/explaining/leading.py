@@ -25,7 +25,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     no_terms,
 )
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit
-from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN
+from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN, ONSET_SHARE
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.regions import region_bank
@@ -83,8 +83,13 @@ def leader_of(
             likeliest = min(likeliest, one.evidence)
     if not enough:
         return None
-    near = _as_well(current)
-    enough = [pair for pair in enough if not _holds_always_as_well(pair[1], enough, near)]
+    enough = [
+        pair
+        for pair in enough
+        if not _holds_always_as_well(
+            pair[1], enough, _as_well(current, so_far - pair[1].evidence)
+        )
+    ]
     enough = explaining_what_stands_out(searcher, whitener, current, enough)
     most = max(brings for brings, _ in enough)
     leader = next(one for brings, one in enough if brings >= (1.0 - EQUAL_SHARE) * most)
@@ -154,13 +159,15 @@ def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
     return max(rivals, key=lambda rival: rival[0])[1].fit
 
 
-def _as_well(current: Fit | None) -> float:
+def _as_well(current: Fit | None, gain: float) -> float:
     """By how much less an effect may bring that always holds, to be as good as one that passes.
 
     Args:
         current: The terms so far.
+        gain: What the one that passes brings.
     """
-    return NEARLY_AS_WELL_BESIDE if current is not None and current.terms else NEARLY_AS_WELL
+    least = NEARLY_AS_WELL_BESIDE if current is not None and current.terms else NEARLY_AS_WELL
+    return max(least, ONSET_SHARE * gain)
 
 
 def _holds_always_as_well(
@@ -178,7 +185,13 @@ def _holds_always_as_well(
     )
 
 
-def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judged:
+def held_throughout(
+    searcher: Searcher,
+    one: Judged,
+    named: Fit | None,
+    gain: float = 0.0,
+    others: Sequence[Judged] = (),
+) -> Judged:
     """The explanation with its last effect all the time, where that explains nearly as much.
 
     A fit that has to find a large effect from a small one may go astray over the whole record and
@@ -189,17 +202,29 @@ def held_throughout(searcher: Searcher, one: Judged, named: Fit | None) -> Judge
         searcher: The search.
         one: An explanation.
         named: The terms so far; None: there are none.
+        gain: What it brings.
+        others: Explanations that were found with it, the same effect all the time among them.
     """
     newest = one.fit.terms[-1]
-    read = any(guess.interval != ALWAYS for guess in searcher.guesses.get(newest.key, ()))
-    if newest.interval == ALWAYS or newest.effect.legible:
+    if newest.interval == ALWAYS:
         return one
-    terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
-    always = fit(one.whitener, searcher.station, terms, searcher.bank.without)
-    (other,) = judged(searcher, [always], named)
-    allowed = -ONSET_GAIN if read else _as_well(named)
-    as_well = is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
-    return other if as_well else one
+    read = any(guess.interval != ALWAYS for guess in searcher.guesses.get(newest.key, ()))
+    always = [
+        other
+        for other in others
+        if other.fit.terms[-1].key == newest.key and other.fit.terms[-1].interval == ALWAYS
+    ]
+    if not newest.effect.legible:
+        terms = (*one.fit.terms[:-1], replace(newest, interval=ALWAYS))
+        again = fit(one.whitener, searcher.station, terms, searcher.bank.without)
+        always += judged(searcher, [again], named)
+    allowed = -ONSET_GAIN if read else _as_well(named, gain)
+    as_well = [
+        other
+        for other in always
+        if is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
+    ]
+    return min(as_well, key=lambda other: other.evidence, default=one)
 
 
 def not_told(one: Judged) -> bool:

@@ -80,15 +80,9 @@ def gain_in_parts(comparison: Comparison, before: Fit, after: Fit, width: int) -
         before, after: Two explanations in the same null.
         width: Of a part, in bins.
     """
-    n = comparison.coefficients
-    parts = comparison.grid.n // width
-    gain = np.zeros(parts)
-    for k in range(len(comparison.channels)):
-        for sign, fitted in ((1.0, before), (-1.0, after)):
-            white = np.zeros(comparison.grid.n)
-            white[:n] = fitted.vector[k * n : (k + 1) * n]
-            squares = spectra.from_cosine(white)[: parts * width] ** 2
-            gain += sign * squares.reshape(parts, width).sum(axis=1)
+    gain = squares_in_parts(comparison, before.vector, width)
+    gain -= squares_in_parts(comparison, after.vector, width)
+    parts = gain.size
     counted = comparison.measured.counted.size
     number = segments_of(comparison.grid)
     of_activity = sum(comparison.measured.levels[c.name].size for c in comparison.channels)
@@ -97,6 +91,25 @@ def gain_in_parts(comparison: Comparison, before: Fit, after: Fit, width: int) -
         each = drop.reshape(-1, counted).sum(axis=0) / np.bincount(number)
         gain += each[number][: parts * width].reshape(parts, width).sum(axis=1)
     return gain
+
+
+def squares_in_parts(comparison: Comparison, vector: FloatArray, width: int) -> FloatArray:
+    """Sum of the squares of white series in each part of the record.
+
+    Args:
+        comparison: The recording.
+        vector: White vector, shape (m,).
+        width: Of a part, in bins.
+    """
+    n = comparison.coefficients
+    parts = comparison.grid.n // width
+    squares = np.zeros(parts)
+    for k in range(len(comparison.channels)):
+        white = np.zeros(comparison.grid.n)
+        white[:n] = vector[k * n : (k + 1) * n]
+        at = spectra.from_cosine(white)[: parts * width] ** 2
+        squares += at.reshape(parts, width).sum(axis=1)
+    return squares
 
 
 BY_CHANCE = 2.0
@@ -108,7 +121,8 @@ def single_event(comparison: Comparison, before: Fit, after: Fit) -> float:
 
     One gust that the reference missed, one swing of a vane can make any effect look better that
     moves the signals a little; if it always holds, it does so again and again. What acts in a
-    sector or in a lull may show once.
+    sector or in a lull may show once, and what changes little elsewhere (a counter's dead time
+    below the strongest wind) gains in each moment as it acts there.
 
     Args:
         comparison: The recording.
@@ -118,12 +132,16 @@ def single_event(comparison: Comparison, before: Fit, after: Fit) -> float:
     passing = newest.interval != ALWAYS
     if newest.effect.occasional and not passing:
         return 0.0
-    gain = gain_in_parts(comparison, before, after, comparison.grid.n // MOMENTS)[:MOMENTS]
+    width = comparison.grid.n // MOMENTS
+    gain = gain_in_parts(comparison, before, after, width)[:MOMENTS]
     together = 1 if passing else EVENT
     around = np.convolve(gain, np.ones(together), "same")
     best = int(np.argmax(around))
     elsewhere = np.abs(np.arange(gain.size) - best) >= together
-    more = float(around[best] - max(np.max(around[elsewhere]), 0.0))
+    acting = squares_in_parts(comparison, after.vector - before.vector, width)[:MOMENTS]
+    acts_then = float(np.convolve(acting, np.ones(together), "same")[best] / acting.sum())
+    expected = max(np.max(around[elsewhere]), acts_then * float(gain.sum()), 0.0)
+    more = float(around[best] - expected)
     return more if more > BY_CHANCE else 0.0
 
 

@@ -46,6 +46,10 @@ LEAST_WINDOW_GAIN = 20.0
 ONSET_GAIN = 20.0
 """What a beginning or an end of a named effect must bring beyond its cost."""
 
+ONSET_SHARE = 0.01
+"""And this share of what the effect brings: one that is not there for half a minute of a quarter of
+an hour would miss more if it always held, and the form of large ones errs by as much."""
+
 REFINING_STEPS = (15.0, 4.0, 1.0)
 """Distances [s] between the beginnings and ends that are tried around the best so far."""
 
@@ -315,7 +319,12 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
         cells = cell_signatures(comparison, without, current.simulated, whitener.trust, cuts)
         gains = interval_gains(cuts, [whitener.through_standing(cells)], start, joint=False)
         span = _best_span(gains, SHORTEST_WINDOW)
-        if span is None or known.cost - (float(start @ start) - span.net) < ONSET_GAIN:
+        before = float(start @ start)
+        # Not in the null, which lets the effect have another size.
+        gain = np.sum(whitener.noise_whitened(without) ** 2)
+        gain -= np.sum(whitener.noise_whitened(current.simulated) ** 2)
+        least = max(ONSET_GAIN, ONSET_SHARE * float(gain))
+        if span is None or known.cost - (before - span.net) < least:
             continue
         interval = interval_of(comparison, *span.window)
         passing = replace(term, interval=interval)
@@ -326,6 +335,6 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
         always = fit(
             whitener, searcher.station, current.terms, searcher.bank.without, known=current
         )
-        if total(trial) < total(always) - ONSET_GAIN and plausible(trial):
+        if total(trial) < total(always) - least and plausible(trial):
             current = trial
     return current

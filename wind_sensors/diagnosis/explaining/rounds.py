@@ -133,7 +133,9 @@ def _one_more(
     best = leader_of(searcher, whitener, current, ranked)
     if best is None:
         return None
-    leader = held_throughout(searcher, best, named)
+    leader = held_throughout(
+        searcher, best, named, evidence(current, whitener) - best.evidence, ranked
+    )
     losers = tuple(
         Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not best
     )

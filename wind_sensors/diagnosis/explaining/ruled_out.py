@@ -19,6 +19,17 @@ FEWEST_SOONER = 5
 """A counter that stops being deaf shows so many intervals shorter than this share of its dead
 time."""
 
+TOO_SOON = 0.9
+MOST_TOO_SOON = 0.02
+"""While a counter is deaf for some time after each pulse, no more than the second share of the
+intervals between pulses is shorter than the first share of that time."""
+
+BY_CHANCE = 1e-6
+"""Pulses lost one by one leave a silence as long as that of the record with less probability."""
+
+SHORTEST_SILENCE = 5.0
+"""Of what is shorter [s] a gust may be the cause."""
+
 FLOATS = 2.0
 """Form of a gap in which the reading may be anything."""
 
@@ -43,7 +54,10 @@ def ruled_out(comparison: Comparison, station: Station, terms: Sequence[Term]) -
         terms: The explanation.
     """
     return any(
-        _reads_in_its_gap(comparison, station, term, terms) or _goes_on(comparison, term)
+        _reads_in_its_gap(comparison, station, term, terms)
+        or _goes_on(comparison, term)
+        or _hears_too_soon(comparison, term)
+        or _is_silent(comparison, station, term, terms)
         for term in terms
     )
 
@@ -60,6 +74,56 @@ def _goes_on(comparison: Comparison, term: Term) -> bool:
     time = comparison.grid.seconds(comparison.recording.pulses[term.instrument].time)
     since = time[1:] + comparison.drive.elapsed
     return not comes_sooner(since, np.diff(time), term.values["dead_time"], term.interval)
+
+
+def _hears_too_soon(comparison: Comparison, term: Term) -> bool:
+    """Whether pulses come sooner than a dead time allows while it is said to hold.
+
+    Args:
+        comparison: The recording.
+        term: Any effect; only lost pulses are asked.
+    """
+    if term.effect.name != "missed_pulses" or term.values["dead_time"] <= 0.0:
+        return False
+    intervals, _ = _while_it_holds(comparison, term)
+    too_soon = np.count_nonzero(intervals < TOO_SOON * term.values["dead_time"])
+    return bool(too_soon > max(MOST_TOO_SOON * intervals.size, FEWEST_SOONER))
+
+
+def _is_silent(
+    comparison: Comparison, station: Station, term: Term, terms: Sequence[Term]
+) -> bool:
+    """Whether pulses are said to be lost one by one, where for long there is none at all.
+
+    Args:
+        comparison: The recording.
+        station: As commissioned.
+        term: Any effect; only lost pulses are asked.
+        terms: All effects: another one on the same rotor may be what silences it.
+    """
+    alone = sum(t.instrument == term.instrument for t in terms) == 1
+    if term.effect.name != "missed_pulses" or not alone:
+        return False
+    intervals, ends = _while_it_holds(comparison, term)
+    if not intervals.size or intervals.max() < SHORTEST_SILENCE:
+        return False
+    longest = int(np.argmax(intervals))
+    expected, _ = comparison.signals(station, (term.instrument,))
+    due = comparison.grid.seconds(expected[term.instrument].time)
+    due = due[(due > ends[longest] - intervals[longest]) & (due < ends[longest])]
+    # Of pulses that come sooner than the dead time at least one is heard in each such time.
+    heard = np.floor(due / max(term.values["dead_time"], 1e-9))
+    heard = np.unique(heard) if term.values["dead_time"] > 0.0 else due
+    return bool(heard.size * np.log(max(term.values["loss_probability"], 1e-12)) < np.log(BY_CHANCE))
+
+
+def _while_it_holds(comparison: Comparison, term: Term) -> tuple[FloatArray, FloatArray]:
+    """Intervals between the pulses of a rotor that lie in a term's interval, and their ends [s]."""
+    time = comparison.grid.seconds(comparison.recording.pulses[term.instrument].time)
+    since = time + comparison.drive.elapsed
+    begin, end = term.interval
+    holds = (since[:-1] >= begin) & (since[1:] <= (np.inf if end is None else end))
+    return np.diff(time)[holds], time[1:][holds]
 
 
 def comes_sooner(

@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.intervals import cell_signatures, window_of
+from wind_sensors.diagnosis.explaining.moments import squares_in_parts
 from wind_sensors.diagnosis.healthy.whitening import in_series
 from wind_sensors.station.model import Station
 
@@ -213,12 +214,8 @@ def drop_by_own_delays(naming: Naming, station: Station, term: Term) -> float:
 def _costs_in_parts(naming: Naming, simulated: Simulated) -> FloatArray:
     """Cost of the series in each part of the record, shape (parts,)."""
     comparison = naming.adequate.comparison
-    n = comparison.coefficients
-    white = np.zeros((len(comparison.channels), comparison.grid.n))
-    left = naming.adequate.of(simulated)
-    white[:, :n] = left[: n * len(comparison.channels)].reshape(-1, n)
-    squares = np.sum([spectra.from_cosine(each) ** 2 for each in white], axis=0)
-    return np.array([part.sum() for part in np.array_split(squares, PARTS)])
+    width = comparison.grid.n // PARTS
+    return squares_in_parts(comparison, naming.adequate.of(simulated), width)[:PARTS]
 
 
 def _drop_by_growth(cells: FloatArray, left: FloatArray) -> float:

@@ -127,14 +127,15 @@ def remainder_of(
     What another instrument shows beside them says nothing against the names, unless it carries the
     one that they change (a vane off the wind takes its propeller along) and stands out by itself;
     nor does what a healthy day shows as loudly, nor some more power of eddies if they bring eddies
-    of their own.
+    of their own, or of the statistics in which their form is not certain.
     """
     scores = bank.scores(naming.adequate.of(naming.fit.simulated))
     if naming.fit.terms:
         changed = _changed(naming)
         channels = changed | carriers_of(comparison, changed)
         stirred = any(term.effect.stirs for term in naming.fit.terms)
-        own = [stirred and r.kind in STIRRED_KINDS for r in bank.regions]
+        loose = {name for term in naming.fit.terms for name in term.effect.loose_statistics}
+        own = [(stirred and r.kind in STIRRED_KINDS) or r.label in loose for r in bank.regions]
         untouched = [r.channel not in changed or _is_outside(r, naming) for r in bank.regions]
         scores = np.where([r.channel in channels for r in bank.regions], scores, 0.0)
         scores *= np.where(untouched, REMAINDER_SCORE, 1.0) / np.where(own, STIRRED_TIMES, 1.0)
