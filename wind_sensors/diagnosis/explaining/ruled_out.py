@@ -114,7 +114,8 @@ def _is_silent(
     # Of pulses that come sooner than the dead time at least one is heard in each such time.
     heard = np.floor(due / max(term.values["dead_time"], 1e-9))
     heard = np.unique(heard) if term.values["dead_time"] > 0.0 else due
-    return bool(heard.size * np.log(max(term.values["loss_probability"], 1e-12)) < np.log(BY_CHANCE))
+    lost = max(term.values["loss_probability"], 1e-12)
+    return bool(heard.size * np.log(lost) < np.log(BY_CHANCE))
 
 
 def _while_it_holds(comparison: Comparison, term: Term) -> tuple[FloatArray, FloatArray]:
