@@ -82,11 +82,12 @@ def test_an_offset_is_the_same_in_strong_wind(with_speed: bool) -> None:
     offset = Term(catalogue()["vane_offset"], "vane", {"offset": 8.0})
     naming = named(searcher, searcher.whitener(searcher.bank.without), offset)
     assert goes_with_speed(naming, STATION) is with_speed
-    # A bearing has its own law of the speed.
-    sticking = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
-    assert not goes_with_speed(
-        replace(naming, fit=replace(naming.fit, terms=(sticking,))), STATION
-    )
+    # A bearing has its own law of the speed, and so has what damps.
+    for own in (
+        Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}),
+        Term(catalogue()["vane_damping"], "vane", {"damping_factor": 4.0}),
+    ):
+        assert not goes_with_speed(replace(naming, fit=replace(naming.fit, terms=(own,))), STATION)
 
 
 @pytest.mark.parametrize("damping", [2.5, 1.0])

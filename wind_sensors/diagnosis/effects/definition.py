@@ -110,6 +110,8 @@ class Effect:
         unmistakable: The signals that tell its values tell that it is this effect, too. Silence
             they tell, but not whether the sensor or its bearing is stuck; uneven intervals, but not
             whether the disc or a cup makes them.
+        own_law: How it changes with the wind's speed differs from one cause to another: a stiff
+            grease damps a vane less and less against the wind's own damping as the wind grows.
         loose_statistics: Statistics of the raw signals, by their labels, in which its form is not
             certain: what it leaves there says little against it.
         stirs: It brings eddies of its own where it acts, of which the reference knows nothing.
@@ -141,6 +143,7 @@ class Effect:
     sticks: Callable[[Values], bool] | None = None
     unmistakable: bool = False
     stirs: bool = False
+    own_law: bool = False
     loose_statistics: frozenset[str] = frozenset()
     standing: float = 0.1
     standing_in_calm: float = 0.0

@@ -100,6 +100,7 @@ VANE_DAMPING = Effect(
     applies=is_vane,
     update=_damping,
     form_error=0.15,
+    own_law=True,
     templates=({"damping_factor": 1.4}, {"damping_factor": 0.6}),
     confusable={
         "vane_inertia": "a release test from 10 degrees",

@@ -373,12 +373,15 @@ def is_uneven(naming: Naming, station: Station) -> bool:
 def goes_with_speed(naming: Naming, station: Station) -> bool:
     """Whether an effect has another size in strong wind than in weak wind.
 
-    Not asked of friction and of what sticks, slips or is drawn at random, whose own laws of the
-    speed differ from bearing to bearing, nor of delays: the wind's way to the reference is one.
+    Not asked of friction, damping and of what sticks, slips or is drawn at random, whose own laws
+    of the speed differ from bearing to bearing, nor of delays: the wind's way to the reference is
+    one.
     """
     for term in naming.fit.terms:
         effect = term.effect
-        own_law = effect.noisy or effect.occasional or effect.entrance == "clock"
+        own_law = (
+            effect.own_law or effect.noisy or effect.occasional or effect.entrance == "clock"
+        )
         if own_law or effect.legible or term.is_told:
             continue
         share = WITH_SPEED_EXACT_SHARE if effect.exact else WITH_SPEED_SHARE
