@@ -135,6 +135,14 @@ def test_readings_that_repeat_tell_the_step_and_since_when() -> None:
     assert ("quantisation", "vane") not in healthy
 
 
+@pytest.mark.parametrize("seed", range(70, 80))
+def test_a_vane_that_sticks_stands_on_no_steps(seed: int) -> None:
+    sticking = {"friction_speed": 3.5}
+    station = with_effect(STATION, catalogue()["vane_friction"], "vane", sticking)
+    guesses = guesses_of(prepare(recorded(station, seed)), STATION)
+    assert ("quantisation", "vane") not in guesses
+
+
 def test_few_fine_readings_hide_no_coarse_ones() -> None:
     """A coarse part so long that most readings repeat, and the fine ones beside it do not."""
     effect = catalogue()["quantisation"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,8 +43,14 @@ LEAST_REPEATS = 20
 FEWEST_STEPS = 3
 SMOOTHED_READINGS = 101
 SHORTEST_COARSE = 60.0
+ON_STEPS = 0.9
+FEWEST_VISITS = 2.0
+WIDEST_STEP = 45.0
 """Readings that come so many times as often as others, and so often, are coarse: at least three
-different ones, most of so many readings in a row, for so long [s]."""
+different ones, most of so many readings in a row, for so long [s]; they lie on steps of no more
+[deg] (mean vector of their remainders), and the vane comes back to them: one that sticks stands
+where it happened to.
+"""
 
 
 def vane_guesses(comparison: Comparison, channel: Channel, vane: Angle) -> list[Term]:
@@ -97,7 +104,8 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
     steps = steps[steps > 0.02]
     if values.size < 0.25 * readings.size and steps.size > 1:
         step = float(np.median(steps[steps < 1.5 * np.quantile(steps, 0.2) + 1e-9]))
-        if np.sum(counts) / values.size > 8.0 and step > 0.3:
+        coarse = np.sum(counts) / values.size > 8.0 and step > 0.3
+        if coarse and _are_steps(values, step):
             turns = np.exp(2j * np.pi * values / step)
             origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
             out.append(suggested("quantisation", vane, step=step, origin=origin))
@@ -174,10 +182,19 @@ def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
     if inside.size < FEWEST_STEPS or time[end - 1] - time[begin] < SHORTEST_COARSE:
         return []
     step = float(np.median(np.diff(inside)))
+    visits = np.count_nonzero(np.diff(degrees[begin:end])) + 1
+    if not _are_steps(inside, step) or visits < FEWEST_VISITS * inside.size:
+        return []
     turns = np.exp(2j * np.pi * inside / step)
     origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
     holds = interval_of(comparison, float(time[begin]), float(time[end - 1]))
     return [replace(suggested("quantisation", vane, step=step, origin=origin), interval=holds)]
+
+
+def _are_steps(values: npt.NDArray[np.floating[Any]], step: float) -> bool:
+    """Whether values [deg] are so many steps apart, and not where a vane happened to stick."""
+    on_steps = np.abs(np.mean(np.exp(2j * np.pi * values / step)))
+    return bool(on_steps > ON_STEPS and step < WIDEST_STEP)
 
 
 def _gap(
