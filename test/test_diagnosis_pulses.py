@@ -190,6 +190,23 @@ def test_what_the_recording_does_not_show_is_held_where_it_was() -> None:
     assert without_run_aways(icing) is None
 
 
+@pytest.mark.parametrize(
+    ("effect", "name", "value", "away"),
+    [
+        ("vane_damping", "damping_factor", 0.3, False),
+        ("vane_damping", "damping_factor", 0.1, True),
+        ("vane_damping", "damping_factor", 17.5, True),
+        ("vane_inertia", "inertia_factor", 0.5, False),
+        ("icing", "inertia_factor", 0.8, False),
+    ],
+)
+def test_a_damper_that_has_lost_its_oil_is_not_at_the_bounds_of_the_search(
+    effect: str, name: str, value: float, away: bool
+) -> None:
+    values = {**catalogue()[effect].templates[0], name: value}
+    assert (name in run_away(Term(catalogue()[effect], "vane", values))) is away
+
+
 @pytest.mark.parametrize(("breakaway", "noisy"), [(1.0, False), (2.2, True)])
 def test_a_bearing_that_sticks_leaves_noise_of_its_own(breakaway: float, noisy: bool) -> None:
     values = {"friction_speed": 1.5, "temperature_coefficient": 0.0, "breakaway": breakaway}

@@ -11,7 +11,8 @@ _MARGIN = 0.02
 """A value is at a bound within this share of the bounds' distance."""
 
 _REACH = 0.85
-"""What multiplies (a gain, an inertia) is at its upper bound from this share of the way on."""
+"""What multiplies (a gain, an inertia) is at its upper bound from this share of the way on, and not
+at its lower one before: a share of all that it may grow by is much of what it may shrink by."""
 
 
 def run_away(term: Term) -> frozenset[str]:
@@ -33,7 +34,10 @@ def _is_at_bound(parameter: Parameter, value: float) -> bool:
         return False
     if parameter.healthy == 1.0 and value > 1.0 + _REACH * (parameter.high - 1.0):
         return True
-    at_bound = value < parameter.low + margin or value > parameter.high - margin
+    least = parameter.low + margin
+    if parameter.healthy == 1.0:
+        least = min(least, 1.0 - _REACH * (1.0 - parameter.low))
+    at_bound = value < least or value > parameter.high - margin
     return at_bound and abs(value - parameter.healthy) > margin
 
 
