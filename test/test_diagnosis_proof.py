@@ -95,3 +95,5 @@ def test_what_acts_for_a_short_while_is_proved_in_shorter_blocks(
     at = np.linspace(0.0, 1.0, 4000)
     acting = ((at >= begin) & (at <= end)).astype(float)
     assert blocks_for([np.ones(4000), acting]) == times * BLOCKS
+    # What shows in the pulses' intervals alone has no place in the record.
+    assert blocks_for([1e-7 * acting]) == BLOCKS

@@ -24,7 +24,8 @@ FINEST = 4
 LEAST_IN_A_HALF = 0.15
 """or up to so many times as many, until every other one holds this share of what each effect
 changes: a vane that is in its gap for one minute cannot tell, in the minutes without it, what the
-gap reads."""
+gap reads. What changes the series by less than this, in squares of noise, acts in statistics."""
+ACTS_IN_SERIES = 1.0
 
 GAP = 4.0
 """Between a fitted and a scored block [s]."""
@@ -50,9 +51,12 @@ def blocks_for(acting: Sequence[FloatArray]) -> int:
         acting: Squares of what each effect changes in each bin, shape (n,) each.
     """
     blocks = BLOCKS
+    shown = [one for one in acting if float(one.sum()) > ACTS_IN_SERIES]
     while blocks < FINEST * BLOCKS:
-        odd = _block_numbers(acting[0].size, blocks) % 2 == 1
-        shares = [float(one[odd].sum()) / max(float(one.sum()), 1e-30) for one in acting]
+        shares = [
+            float(one[_block_numbers(one.size, blocks) % 2 == 1].sum() / one.sum())
+            for one in shown
+        ]
         if all(LEAST_IN_A_HALF < share < 1.0 - LEAST_IN_A_HALF for share in shares):
             return blocks
         blocks *= 2
