@@ -139,7 +139,9 @@ def single_event(comparison: Comparison, before: Fit, after: Fit) -> float:
     best = int(np.argmax(around))
     elsewhere = np.abs(np.arange(gain.size) - best) >= together
     acting = squares_in_parts(comparison, after.vector - before.vector, width)[:MOMENTS]
-    acts_then = float(np.convolve(acting, np.ones(together), "same")[best] / acting.sum())
+    # What acts in statistics alone changes no part of the record.
+    everywhere = max(float(acting.sum()), 1e-12)
+    acts_then = float(np.convolve(acting, np.ones(together), "same")[best]) / everywhere
     expected = max(np.max(around[elsewhere]), acts_then * float(gain.sum()), 0.0)
     more = float(around[best] - expected)
     return more if more > BY_CHANCE else 0.0

@@ -25,10 +25,10 @@ MOST_TOO_SOON = 0.02
 intervals between pulses is shorter than the first share of that time."""
 
 BY_CHANCE = 1e-6
-"""Pulses lost one by one leave a silence as long as that of the record with less probability."""
-
 SHORTEST_SILENCE = 5.0
-"""Of what is shorter [s] a gust may be the cause."""
+FEWEST_DUE = 50
+"""Pulses lost one by one leave a silence as long as that of the record with less probability. In a
+shorter one [s], or one in which fewer pulses are due, a rotor may have stood still in a lull."""
 
 FLOATS = 2.0
 """Form of a gap in which the reading may be anything."""
@@ -115,7 +115,7 @@ def _is_silent(
     heard = np.floor(due / max(term.values["dead_time"], 1e-9))
     heard = np.unique(heard) if term.values["dead_time"] > 0.0 else due
     lost = max(term.values["loss_probability"], 1e-12)
-    return bool(heard.size * np.log(lost) < np.log(BY_CHANCE))
+    return bool(heard.size >= FEWEST_DUE and heard.size * np.log(lost) < np.log(BY_CHANCE))
 
 
 def _while_it_holds(comparison: Comparison, term: Term) -> tuple[FloatArray, FloatArray]:

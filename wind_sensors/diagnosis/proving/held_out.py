@@ -22,10 +22,11 @@ BLOCKS = 12
 
 FINEST = 4
 LEAST_IN_A_HALF = 0.15
+ACTS_IN_SERIES = 1.0
 """or up to so many times as many, until every other one holds this share of what each effect
 changes: a vane that is in its gap for one minute cannot tell, in the minutes without it, what the
-gap reads. What changes the series by less than this, in squares of noise, acts in statistics."""
-ACTS_IN_SERIES = 1.0
+gap reads. What changes the series by less than the last, in squares of noise, shows in statistics
+alone."""
 
 GAP = 4.0
 """Between a fitted and a scored block [s]."""
