@@ -234,6 +234,8 @@ def _finding(effect: str, instrument: str, share: float, p: float) -> Finding:
 OFFSET = ("calibration_offset", "cup")
 ASYMMETRY = ("torque_asymmetry", "cup")
 LATE = ("timestamp_latency", "vane")
+TURNED = ("vane_offset", "vane")
+SLOW = ("low_pass_filter", "vane")
 
 
 @pytest.mark.parametrize(
@@ -245,7 +247,11 @@ LATE = ("timestamp_latency", "vane")
         ((OFFSET, ASYMMETRY), (60.0, 30.0), (0.002, 0.4), True),
         ((OFFSET, ASYMMETRY), (30.0, 110.0), (0.002, 0.4), False),
         ((OFFSET, LATE), (40.0, 70.0), (0.002, 0.4), False),
-        ((OFFSET, LATE), (60.0, 45.0), (0.002, 0.4), True),
+        ((OFFSET, TURNED), (60.0, 45.0), (0.002, 0.4), True),
+        ((OFFSET, LATE), (60.0, 45.0), (0.002, 0.4), False),
+        ((OFFSET, LATE), (60.0, 25.0), (0.002, 0.4), True),
+        ((SLOW, LATE), (100.0, 90.0), (0.002, 0.002), True),
+        ((SLOW, LATE), (100.0, 110.0), (0.002, 0.002), False),
         ((OFFSET,), (100.0,), (0.4,), False),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,8 @@ from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.moves import simplified, swapped
 from wind_sensors.diagnosis.explaining.pairs import built_on_simple, promise, promising_pairs
 from wind_sensors.diagnosis.explaining.rounds import first_round
-from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.verdict import diagnose
 
 
@@ -65,6 +67,12 @@ def test_a_pair_that_smooths_starts_from_the_sizes_that_both_have_alone_too() ->
         assert sorted(as_alone) == [False, True]
 
 
+def null_of(searcher: Searcher, terms: Sequence[Term]) -> Whitener:
+    """The null seen from the simulation with some effects."""
+    simulated = searcher.comparison.simulate(planted(searcher.station, terms))
+    return searcher.whitener(simulated)
+
+
 def test_a_heavy_rotor_in_a_bad_bearing_is_not_called_iced() -> None:
     """Ice makes a rotor slower and heavier with two numbers of one effect."""
     effects = catalogue()
@@ -88,6 +96,21 @@ def test_ice_without_weight_is_a_calibration() -> None:
     (left,) = simplified(searcher, null, weightless).terms
     assert left.key == ("calibration_drift", "cup")
     assert left.values["gain"] == pytest.approx(0.9, abs=0.01)
+
+
+@pytest.mark.parametrize(("drift", "left"), [(1.02, True), (1.3, False)])
+def test_a_small_effect_that_brings_most_mends_nothing(drift: float, left: bool) -> None:
+    """A rotor one and a half times as heavy beside a gain of more of its smallest sizes."""
+    effects = catalogue()
+    heavy = Term(effects["rotor_inertia"], "cup", {"inertia_factor": 1.5})
+    terms = [heavy, Term(effects["calibration_drift"], "cup", {"gain": drift})]
+    assert heavy.relative_size < terms[1].relative_size
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, terms), 71, swing=1.0)), baseline(), effects, {}
+    )
+    both = fit(null_of(searcher, terms), STATION, terms, searcher.bank.without, iterations=0)
+    names = {t.effect.name for t in simplified(searcher, null_of(searcher, terms), both).terms}
+    assert names == ({"rotor_inertia", "calibration_drift"} if left else {"calibration_drift"})
 
 
 def test_of_a_healthy_rotor_no_ice_is_left() -> None:
@@ -183,6 +206,23 @@ def test_an_effect_of_a_pair_is_exchanged_for_what_competed_before() -> None:
     # Nothing of the rotor takes the vane's place, or the other way round.
     for loser in losers:
         assert {t.instrument for t in loser.fit.terms} & {"vane", "station"}
+
+
+def test_what_another_effect_explains_better_goes_if_that_brings_too_little() -> None:
+    # A slow filter, and what is left of it called an imbalance; a bearing that sticks a little
+    # explains that better, but not by as much as the filter's own form may be wrong by.
+    effects = catalogue()
+    slow = Term(effects["low_pass_filter"], "vane", {"time_constant": 0.7})
+    sticks = Term(effects["vane_friction"], "vane", {"friction_speed": 0.6})
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, [slow, sticks]), 75, swing=0.6)), baseline(), effects, {}
+    )
+    null = null_of(searcher, [slow])
+    lean = {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 0.0}
+    wrong = fit(null, STATION, [slow, Term(effects["vane_imbalance"], "vane", lean)], None)
+    found, losers = swapped(searcher, null, wrong, [sticks])
+    assert [t.effect.name for t in found.terms] == ["low_pass_filter"]
+    assert all(len(a.fit.terms) == 1 for a in losers)
 
 
 def test_a_rotor_of_another_calibration_is_not_called_damaged() -> None:

@@ -12,15 +12,26 @@ from test_diagnosis_naming import STATION, baseline, recorded
 from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.explanation import Alternative, Judged, Naming, no_terms
+from wind_sensors.diagnosis.explaining import acceptance
+from wind_sensors.diagnosis.explaining.acceptance import calms_too_much
+from wind_sensors.diagnosis.explaining.explanation import (
+    Alternative,
+    Judged,
+    Naming,
+    judged,
+    no_terms,
+)
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
 from wind_sensors.diagnosis.explaining.moves import merged
 from wind_sensors.diagnosis.explaining.naming import kept_if_better, name, named_alone
+from wind_sensors.diagnosis.explaining.onsets import in_a_part
 from wind_sensors.diagnosis.explaining.rounds import blind_starts, first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.proving import findings
 from wind_sensors.diagnosis.proving.decision import (
     REMAINDER_SCORE,
     REMAINDER_SCORES,
@@ -30,7 +41,7 @@ from wind_sensors.diagnosis.proving.decision import (
     unstirred,
 )
 from wind_sensors.diagnosis.proving.findings import equal_explanations
-from wind_sensors.diagnosis.regions import Region, RegionBank, region_bank
+from wind_sensors.diagnosis.regions import Region, RegionBank, region_bank, strongest
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Series
@@ -217,6 +228,65 @@ def test_an_axis_that_leans_for_some_minutes_is_found_though_small_leans_show_no
     assert term.interval[1] == pytest.approx(since[1], abs=15.0)
 
 
+def test_a_vane_that_sticks_from_some_moment_on_does_so_in_that_part_of_the_record() -> None:
+    friction = {"friction_speed": 1.3}
+    station = with_effect(STATION, catalogue()["vane_friction"], "vane", friction, (260.0, None))
+    searcher = searcher_of(prepare(recorded(station, 88)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    sticking = Term(catalogue()["vane_friction"], "vane", friction)
+    always = fit(null, STATION, [sticking], searcher.bank.without)
+    part = in_a_part(searcher, null, always)
+    assert part.cost < always.cost - 20.0
+    assert part.terms[-1].interval[0] == pytest.approx(260.0, abs=30.0)
+    assert part.terms[-1].interval[1] is None
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "gained", "too_much"),
+    [
+        ("vane_friction", {"friction_speed": 0.6}, -12.0, True),
+        ("vane_friction", {"friction_speed": 0.6}, -8.0, False),
+        ("timestamp_latency", {"latency": 0.5}, -12.0, False),
+        ("vane_offset", {"offset": 2.0}, -12.0, False),
+    ],
+)
+def test_what_takes_eddies_away_that_the_signals_have_calms_too_much(
+    monkeypatch: pytest.MonkeyPatch, searcher: Searcher, effect: str, values: dict[str, float],
+    gained: float, too_much: bool,
+) -> None:  # fmt: skip
+    null = searcher.whitener(searcher.bank.without)
+    term = Term(catalogue()[effect], "vane", values)
+    found = fit(null, STATION, [term], searcher.bank.without, iterations=0)
+    monkeypatch.setattr(acceptance, "gained_by_eddies", lambda *_: gained)
+    (one,) = judged(searcher, [found])
+    assert calms_too_much(searcher, one, no_terms(null, searcher)) is too_much
+
+
+def test_the_same_effect_at_other_times_is_no_other_explanation(
+    monkeypatch: pytest.MonkeyPatch, searcher: Searcher
+) -> None:
+    null = searcher.whitener(searcher.bank.without)
+    found = fit(null, STATION, [drift((200.0, None))], searcher.bank.without, iterations=0)
+    offset = Term(catalogue()["vane_offset"], "vane", {"offset": 2.0})
+    later, other = (
+        fit(null, STATION, [term], searcher.bank.without, iterations=0)
+        for term in (drift((230.0, None)), offset)
+    )
+    nothing = null.of(searcher.bank.without)
+    alternatives = (Alternative(later, 2.0), Alternative(other, 40.0))
+    naming = Naming(found, null, null, nothing, 50.0, alternatives)
+    placebos: list[tuple[Term, ...]] = []
+
+    def kept(*arguments: object) -> None:
+        placebos.append(arguments[-1])  # type: ignore[arg-type]
+
+    monkeypatch.setattr(findings, "prove", kept)
+    bank = region_bank(null, searcher.bank.without)
+    before = strongest(null, bank, nothing, searcher.bank.without)
+    findings.findings_of(naming, [], before, bank, searcher.baseline, with_proof=True)
+    assert placebos == [(offset,)]
+
+
 def test_a_grease_tells_nothing_of_its_stiffening_within_minutes_at_one_temperature() -> None:
     recording = recorded(STATION, 75)
     minutes = np.arange(0, recording.stop, 1_000_000_000)
@@ -354,6 +424,26 @@ def test_a_wake_may_leave_some_more_eddies_than_the_simulation_knows(
     loud = _Loud((region,), np.zeros((0, 0)), (), (), np.zeros(0))
     left = remainder_of(naming, loud, comparison, baseline())
     assert left.score == pytest.approx(300.0 / REMAINDER_SCORES[kind] / times)
+
+
+@pytest.mark.parametrize(
+    ("effect", "label", "times"),
+    [
+        ("missed_pulses", "beat of the pulses with the wind, twice per turn", STIRRED_TIMES),
+        ("missed_pulses", "unevenness of the slots once per turn", 1.0),
+        ("calibration_drift", "beat of the pulses with the wind, twice per turn", 1.0),
+    ],
+)
+def test_which_pulse_of_a_turn_a_dead_time_takes_is_not_held_against_it(
+    searcher: Searcher, effect: str, label: str, times: float
+) -> None:
+    assert label in STATISTICS["rotor_rate"]
+    values = {"dead_time": 0.02, "loss_probability": 0.1, "gain": 1.1}
+    naming = named(searcher, Term(catalogue()[effect], "cup", values))
+    region = Region(searcher.comparison.channels[0].name, "statistic", 0.0, 1.0, label)
+    loud = _Loud((region,), np.zeros((0, 0)), (), (), np.zeros(0))
+    left = remainder_of(naming, loud, searcher.comparison, baseline())
+    assert left.score == pytest.approx(300.0 / REMAINDER_SCORES["statistic"] / times)
 
 
 def test_what_a_vane_shows_beside_the_propeller_that_it_carries_has_to_stand_out_by_itself(

@@ -61,6 +61,13 @@ MISSED_PULSES = Effect(
     applies=_is_rotor,
     update=_missed,
     noisy=True,
+    # Which pulses of a turn come within a dead time hangs on hundredths of a millisecond.
+    loose_statistics=frozenset(
+        {
+            "beat of the pulses with the wind, once per turn",
+            "beat of the pulses with the wind, twice per turn",
+        }
+    ),
     templates=(
         {"dead_time": 0.0, "loss_probability": 0.01},
     ),

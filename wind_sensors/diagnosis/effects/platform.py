@@ -324,8 +324,8 @@ ROTOR_DOWNWASH = Effect(
         Parameter("induced_velocity", "m/s", 0.0, 10.0, minimum=0.3, step=0.1),
         # A jet blows down above all: what hardly does is no jet.
         Parameter("wake_skew", "1", 0.0, 0.4, healthy=None, step=0.05),
-        Parameter("forward", "1", -0.4, 0.4, healthy=None, step=0.05),
-        Parameter("leftward", "1", -0.4, 0.4, healthy=None, step=0.05),
+        Parameter("forward", "1", -0.7, 0.7, healthy=None, step=0.05),
+        Parameter("leftward", "1", -0.7, 0.7, healthy=None, step=0.05),
     ),
     applies=_is_platform,
     update=_downwash,

@@ -219,7 +219,7 @@ DAMAGED_CUP = Effect(
     # How much of it comes twice per turn depends on the cup's shape and its speed in the wind.
     loose_statistics=frozenset({"beat of the pulses with the wind, twice per turn"}),
     parameters=(
-        Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.02, step=0.005, starts=(0.05,)),
+        Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.01, step=0.005, starts=(0.05,)),
         Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.02, starts=(0.97,)),
     ),
     applies=_is_rotor,

@@ -152,23 +152,43 @@ def brought(
         return -np.inf
     if is_a_way_of_the_wind(comparison, newest, current.simulated):
         return -np.inf
-    whitener = candidate.whitener
-    before = (
-        fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
-        if current.terms
-        else no_terms(whitener, searcher)
-    )
+    before = _before(searcher, candidate, current)
     if not is_steady(comparison, before, candidate.fit):
         return -np.inf
     if too_small(searcher, candidate.fit, total(before)):
         return -np.inf
-    delays = newest.effect.entrance == "clock"
-    eddies = gained_by_eddies(whitener, before, candidate.fit)
-    if newest.effect.smooths and not delays and eddies < -EDDIES_AGAINST:
+    if _calms_too_much(candidate, before):
         return -np.inf
     gain = total(before) - total(candidate.fit)
     gain -= single_event(comparison, before, candidate.fit)
     return min(gain, before_evidence - candidate.evidence)
+
+
+def calms_too_much(searcher: Searcher, candidate: Judged, current: Fit) -> bool:
+    """Whether a candidate's newest term takes eddies away that the signals have.
+
+    Args:
+        searcher: The search.
+        candidate: An explanation.
+        current: The terms before.
+    """
+    return _calms_too_much(candidate, _before(searcher, candidate, current))
+
+
+def _calms_too_much(candidate: Judged, before: Fit) -> bool:
+    effect = candidate.fit.terms[-1].effect
+    calming = effect.smooths and effect.entrance != "clock"
+    return calming and (
+        gained_by_eddies(candidate.whitener, before, candidate.fit) < -EDDIES_AGAINST
+    )
+
+
+def _before(searcher: Searcher, candidate: Judged, current: Fit) -> Fit:
+    """The terms before a candidate's newest one, fitted in its null."""
+    whitener = candidate.whitener
+    if not current.terms:
+        return no_terms(whitener, searcher)
+    return fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
 
 
 def gained_by_eddies(whitener: Whitener, before: Fit, after: Fit) -> float:

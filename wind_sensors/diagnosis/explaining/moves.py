@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     ACCEPTED_GAIN,
     all_plausible,
     inexact,
+    inexactness,
     is_plausible,
     large_enough,
     may_join,
@@ -22,7 +23,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     times_beside,
     too_small,
 )
-from wind_sensors.diagnosis.explaining.bounds import without_spare
+from wind_sensors.diagnosis.explaining.bounds import run_away, without_spare
 from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Judged,
@@ -60,6 +61,8 @@ MOST_LOOKS = 4
 def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit from the best of the sizes around its own, while that is clearly better.
 
+    Not into the bounds of a parameter, where the fit would be given up.
+
     Args:
         searcher: The search.
         whitener: The null.
@@ -70,8 +73,15 @@ def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         cost, terms = min(costs, key=lambda pair: pair[0], default=(current.cost, ()))
         if cost > current.cost - ROUGHLY:
             return current
-        current = fit(whitener, searcher.station, terms, searcher.bank.without)
+        found = fit(whitener, searcher.station, terms, searcher.bank.without)
+        if _at_bounds(found) > _at_bounds(current):
+            return current
+        current = found
     return current
+
+
+def _at_bounds(found: Fit) -> int:
+    return sum(len(run_away(term)) for term in found.terms)
 
 
 def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
@@ -101,25 +111,29 @@ def _cost(searcher: Searcher, whitener: Whitener, terms: Sequence[Term]) -> floa
 def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit without terms that later ones made superfluous."""
     while len(current.terms) > 1:
-        parts = [without_term(current, k) for k in range(len(current.terms))]
-        without = [
-            fit(
-                whitener,
-                searcher.station,
-                part.terms,
-                searcher.bank.without,
-                known=part,
-                least=ROUGHLY,
-            )
-            for part in parts
-        ]
-        best = min(without, key=total)
+        best = min(_without_each(searcher, whitener, current), key=total)
         if total(best) - total(current) > ACCEPTED_GAIN and all(
             large_enough(t) for t in current.terms
         ):
             break
         current = best
     return current
+
+
+def _without_each(searcher: Searcher, whitener: Whitener, current: Fit) -> list[Fit]:
+    """Fits without the first term, without the second, and so on."""
+    parts = [without_term(current, k) for k in range(len(current.terms))]
+    return [
+        fit(
+            whitener,
+            searcher.station,
+            part.terms,
+            searcher.bank.without,
+            known=part,
+            least=ROUGHLY,
+        )
+        for part in parts
+    ]
 
 
 def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
@@ -136,11 +150,11 @@ def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """
     nothing = no_terms(whitener, searcher)
     while (
-        not all_plausible(current)
+        (mends := _only_mends(searcher, whitener, current))
+        or not all_plausible(current)
         or too_small(searcher, current, total(nothing))
-        or any(only_makes_good(searcher, term, current.terms) for term in current.terms)
     ):
-        fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms))
+        fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms, mends))
         sound = [f for f in fewer if f.terms and all_plausible(f)]
         sound = sound or [f for f in fewer if f.terms]
         if not sound:
@@ -167,13 +181,39 @@ def spared(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     return fewer if total(fewer) < total(current) else current
 
 
-def _simpler(searcher: Searcher, terms: Sequence[Term]) -> list[list[Term]]:
-    """The terms without the implausible ones, and with what these contain in their place."""
-    sound = [
-        term
-        for term in terms
-        if is_plausible(term) and not only_makes_good(searcher, term, terms)
-    ]
+def _only_mends(
+    searcher: Searcher, whitener: Whitener, current: Fit
+) -> frozenset[tuple[str, str]]:
+    """Terms that may only make good the form of larger ones, and bring less than these.
+
+    A carrier's motion left in altogether has no more than two of its smallest sizes; what brings
+    most of all mends nothing.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: The explanation.
+    """
+    small = {t.key for t in current.terms if only_makes_good(searcher, t, current.terms)}
+    if not small:
+        return frozenset()
+    fewer = _without_each(searcher, whitener, current)
+    missed = {term.key: total(f) for term, f in zip(current.terms, fewer, strict=True)}
+    most = max(cost for key, cost in missed.items() if key not in small)
+    return frozenset(key for key in small if missed[key] < most)
+
+
+def _simpler(
+    searcher: Searcher, terms: Sequence[Term], mends: frozenset[tuple[str, str]]
+) -> list[list[Term]]:
+    """The terms without the implausible ones, and with what these contain in their place.
+
+    Args:
+        searcher: The search.
+        terms: The terms.
+        mends: Those that only make good the form of others.
+    """
+    sound = [term for term in terms if is_plausible(term) and term.key not in mends]
     out = [sound] if sound else []
     for term in terms:
         if is_plausible(term):
@@ -254,6 +294,8 @@ def swapped(
 ) -> tuple[Fit, tuple[Alternative, ...]]:
     """The explanation with single terms exchanged for better ones, and those that come close.
 
+    A term goes if what is better in its place brings too little beside the others.
+
     Args:
         searcher: The search.
         whitener: The null.
@@ -263,8 +305,12 @@ def swapped(
     """
     losers: list[Judged] = []
     leader = Judged(current, whitener, evidence(current, whitener))
-    for k in range(len(current.terms)):
-        if current.terms[k].is_told:
+    waiting = [term.key for term in current.terms]
+    most = 2 * len(waiting)
+    for key in waiting:  # grows while terms take the places of others
+        k = [term.key for term in current.terms].index(key)
+        replaced = current.terms[k]
+        if replaced.is_told:
             continue
         part = without_term(current, k)
         others = part.terms
@@ -274,7 +320,7 @@ def swapped(
         )  # fmt: skip
         candidates = [
             starts
-            for starts in _in_place_of(searcher, whitener, without, current.terms[k], known)
+            for starts in _in_place_of(searcher, whitener, without, replaced, known)
             if may_join(starts[0], others) and starts[0].effect.name not in excluded
         ]
         rivals = [
@@ -283,18 +329,43 @@ def swapped(
         nearest = sorted(rivals, key=total)[:SWAP_FINALISTS]
         ranked = [r for r in judged(searcher, nearest) if plausible(r.fit)]
         losers.extend(ranked)
-        replaced = current.terms[k]
         better = next(
             (r for r in ranked if _takes_over(searcher, whitener, r, leader, replaced)), None
         )
         if better is not None:
             losers.append(leader)
+            if not _brings_enough(searcher, whitener, without, better.fit):
+                fewer = fit(
+                    whitener, searcher.station, others, searcher.bank.without, known=without
+                )
+                losers = [r for r in losers if len(r.fit.terms) <= len(others)]
+                leader = judged(searcher, [fewer])[0]
+                current = leader.fit
+                break
             leader = better
             current = leader.fit
+            if len(waiting) < most:
+                # What the new one is mistaken for has not been tried.
+                waiting.append(current.terms[-1].key)
     behind = [
         Alternative(r.fit, _behind(whitener, r, leader)) for r in losers if r is not leader
     ]
     return current, tuple(sorted(behind, key=lambda a: a.behind))
+
+
+def _brings_enough(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> bool:
+    """Whether the newest term brings what a further one has to beside those before.
+
+    What explains best what another one stood for may be the form of the effects beside it; then
+    nothing stands there.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        fewer, more: An explanation, and one with the term.
+    """
+    needed = inexactness(searcher, whitener, fewer, more)
+    return total(fewer) - total(seen_in(whitener, more)) >= needed
 
 
 def _in_common(whitener: Whitener, rival: Judged, leader: Judged) -> float:
@@ -353,6 +424,10 @@ def _in_place_of(
     reached = set(comparison.affected(station, term.instrument))
     suggested = searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
     found = {starts[0].key: starts for starts in suggested}
+    if without.terms:
+        # Beside another effect the screening does not see what only shows in its full size.
+        for starts in _mistaken_for(searcher, term):
+            found.setdefault(starts[0].key, starts)
     for other in known:
         starts = found.setdefault(other.key, [])
         if all(other.interval != start.interval for start in starts):
@@ -362,3 +437,15 @@ def _in_place_of(
         for key, starts in found.items()
         if key != term.key and reached & set(comparison.affected(station, key[1]))
     ]
+
+
+def _mistaken_for(searcher: Searcher, term: Term) -> list[list[Term]]:
+    """Starting points of the effects that one is mistaken for, in its interval."""
+    starts: dict[tuple[str, str], list[Term]] = {}
+    for template in searcher.bank.templates:
+        effect = template.effect
+        confusable = effect.name in term.effect.confusable or term.effect.name in effect.confusable
+        if confusable and not effect.legible:
+            start = Term(effect, template.instrument, dict(template.values), term.interval)
+            starts.setdefault(start.key, []).append(start)
+    return list(starts.values())

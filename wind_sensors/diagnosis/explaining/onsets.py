@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.explaining.screening import (
     starting_values,
 )
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_INTERVAL, Searcher
+from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]
@@ -55,6 +56,9 @@ REFINING_STEPS = (15.0, 4.0, 1.0)
 
 REFINING_REACH = 8
 """So many of them on either side."""
+
+PARTS_TRIED = 8
+"""Beginnings and ends that are tried without screening lie at these parts of the record."""
 
 JUMP_REACH = 4.0
 """Stamps of a clock that begins or stops to be wrong jump within so many seconds [s] of where it
@@ -206,6 +210,37 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
     if best.terms[-1].effect.entrance == "clock":
         best = _at_the_jump(searcher, whitener, best, proposed - {ALWAYS})
     return best
+
+
+def in_a_part(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
+    """The fit with its last term beginning or ending inside the record, where that costs least.
+
+    Tried as it is, part by part: what is seen in statistics of the whole record (how a vane turns)
+    no sum of parts tells.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        candidate: The fit, with a last term that always holds.
+    """
+    comparison = searcher.comparison
+    *fixed, last = candidate.terms
+    length = comparison.grid.n * comparison.grid.dt
+    cuts = np.linspace(0.0, length, PARTS_TRIED + 1)[1:-1]
+    windows = [(0.0, cut) for cut in cuts] + [(cut, length) for cut in cuts]
+
+    def cost(window: tuple[float, float]) -> float:
+        passing = replace(last, interval=interval_of(comparison, *window))
+        simulated = comparison.possible(planted(searcher.station, [*fixed, passing]))
+        if simulated is None:
+            return np.inf
+        vector = whitener.of(simulated)
+        return float(vector @ vector)
+
+    costs = in_parallel(cost, windows, searcher.workers)
+    passing = replace(last, interval=interval_of(comparison, *windows[int(np.argmin(costs))]))
+    trial = fit(whitener, searcher.station, [*fixed, passing], searcher.bank.without)
+    return refined_interval(searcher, whitener, trial)
 
 
 def _at_the_jump(

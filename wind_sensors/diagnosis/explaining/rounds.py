@@ -9,6 +9,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.acceptance import (
+    calms_too_much,
     is_a_stall,
     may_join,
     needed_gain,
@@ -32,7 +33,7 @@ from wind_sensors.diagnosis.explaining.leading import (
     leader_of,
     not_told,
 )
-from wind_sensors.diagnosis.explaining.onsets import refined_interval, window_starts
+from wind_sensors.diagnosis.explaining.onsets import in_a_part, refined_interval, window_starts
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -129,6 +130,7 @@ def _one_more(
     ranked.sort(key=not_told)
     ranked = judged(searcher, [r.fit for r in ranked[:CONTENDERS]], named)
     ranked = [r for r in ranked if plausible(r.fit)]
+    ranked += _where_they_calm(searcher, current, ranked, named)
     ranked = _with_sharp_intervals(searcher, whitener, ranked, named)
     best = leader_of(searcher, whitener, current, ranked)
     if best is None:
@@ -317,6 +319,29 @@ def _finalists(
             for cost, f in zip(costs, fits, strict=True)
         )
     return list(found.values()) if worth else []
+
+
+def _where_they_calm(
+    searcher: Searcher, current: Fit, ranked: Sequence[Judged], named: Fit | None
+) -> list[Judged]:
+    """In a part of the record, what would take eddies away if it always held.
+
+    A vane that sticks from the middle on is seen by how it turns, of which the record has one
+    statistic; the screening of parts does not see it.
+
+    Args:
+        searcher: The search.
+        current: The terms so far.
+        ranked: Explanations with one more.
+        named: The terms so far; None: there are none.
+    """
+    found = []
+    for one in ranked:
+        newest = one.fit.terms[-1]
+        always = newest.interval == ALWAYS and not newest.effect.legible
+        if always and calms_too_much(searcher, one, current):
+            found.append(in_a_part(searcher, one.whitener, one.fit))
+    return judged(searcher, [part for part in found if plausible(part)], named)
 
 
 def _with_sharp_intervals(

@@ -190,12 +190,15 @@ def findings_of(
     """
     whitener = naming.whitener
     estimates = estimates_of(naming.fit)
+    named = {t.key for t in naming.fit.terms}
     behind = tuple(
         (a.fit.terms[-1].effect.name, a.fit.terms[-1].instrument, 0.5 * a.behind)
         for a in naming.alternatives
-        if a.fit.terms[-1].key not in {t.key for t in naming.fit.terms}
+        if a.fit.terms[-1].key not in named
     )
-    placebo = naming.alternatives[0].fit.terms if naming.alternatives else ()
+    others = (a.fit.terms for a in naming.alternatives)
+    # The same effects at other times are no other explanation.
+    placebo = next((terms for terms in others if {t.key for t in terms} != named), ())
     proof = (
         prove(whitener, baseline.station, naming.fit.terms, placebo) if with_proof else None
     )

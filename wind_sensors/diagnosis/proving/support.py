@@ -40,8 +40,10 @@ PASSING_P = 0.02
 """It stands out below this probability: of the many intervals that were tried one fits a gust."""
 
 SURE_GAIN = 50.0
+SURE_QUICK_GAIN = 30.0
 SURE_BESIDE_GAIN = 100.0
-"""The same of what acts on the signals of another effect, and so has no region of its own."""
+"""The same of what only damps or delays signals of its own, and so moves none up or down; and of
+what acts on the signals of another effect, and so has no region of its own."""
 
 SURE_SIZE = 3.0
 """What brings so much and is so many of the smallest sizes worth reporting is there, whatever the
@@ -52,7 +54,8 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     """Whether several effects were put together that the data do not show one by one.
 
     One of them stands out nowhere, though it brings little or not on signals of its own, or each
-    has to make good what the other does to the same signals.
+    has to make good what the other does to the same signals. A delay makes good
+    no damping.
 
     Args:
         findings: What is said.
@@ -65,10 +68,13 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
     for k, f in enumerate(own):
         alone = not reached[k] & set().union(*reached[:k], *reached[k + 1 :])
-        sure = f.gain > (SURE_GAIN if alone else SURE_BESIDE_GAIN)
+        quick = f.term.effect.is_quick and f.term.interval == ALWAYS
+        own_gain = SURE_QUICK_GAIN if quick else SURE_GAIN
+        sure = f.gain > (own_gain if alone else SURE_BESIDE_GAIN)
         if f.p > SHOWN_P and f.share < OWN_SHARE and not sure:
             return True
-    if not set.intersection(*reached) or any(_is_counted(f) for f in own):
+    delayed = any(f.term.effect.entrance == "clock" and f.gain > SURE_BESIDE_GAIN for f in own)
+    if delayed or not set.intersection(*reached) or any(_is_counted(f) for f in own):
         return False
     brought = sum(f.gain for f in own)
     single = max(gain - (brought - f.gain) for f in own)
