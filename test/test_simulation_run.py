@@ -331,3 +331,11 @@ def test_the_command_writes_what_was_simulated(tmp_path, capsys):
     assert main(command) == 2, "what is there is not overwritten"
     assert "--force" in capsys.readouterr().err
     assert main([*command, "--carrier", "boat", "--force"]) == 2, "a mast does not sail"
+
+
+def test_a_rate_that_would_fill_the_memory_is_refused(tmp_path, capsys):
+    command = ["simulate", "mast_cup_vane", "-o", str(tmp_path / "s"), "--duration", "20s"]
+    with pytest.raises(SystemExit) as stopped:
+        main([*command, "--rate", "1e7"])
+    assert stopped.value.code == 2
+    assert "at most 1000 per second" in capsys.readouterr().err

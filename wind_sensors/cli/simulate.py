@@ -22,6 +22,9 @@ from wind_sensors.station.model import Station
 from wind_sensors.station.signals import PlatformStates, Recording, Winds
 from wind_sensors.turbulence.synthesis import TurbulenceSpec, isotropic_spec, surface_layer_spec
 
+FASTEST_RATE = 1000.0
+"""Samples per second beyond which no wind sensor goes, and a quarter of an hour fills a memory."""
+
 _UNITS = {"ms": 1e-3, "min": 60.0, "h": 3600.0, "s": 1.0}
 
 
@@ -51,6 +54,14 @@ def positive(text: str) -> float:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number") from problem
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"must be positive, not '{text}'")
+    return value
+
+
+def sampling_rate(text: str) -> float:
+    """Samples per second, at most `FASTEST_RATE`."""
+    value = positive(text)
+    if value > FASTEST_RATE:
+        raise argparse.ArgumentTypeError(f"must be at most {FASTEST_RATE:g} per second, not {text}")
     return value
 
 
@@ -137,7 +148,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--temperature-amplitude", type=float, default=0.0, help="of a slow change [K]"
     )
     air.add_argument("--pressure", type=positive, default=101_325.0, help="[Pa]")
-    air.add_argument("--rate", type=positive, default=20.0, help="of all sampled signals [1/s]")
+    air.add_argument(
+        "--rate", type=sampling_rate, default=20.0, help="of all sampled signals [1/s]"
+    )
 
     faults = parser.add_argument_group("faults of the transport")
     faults.add_argument("--loss", type=share, default=0.0, help="share of messages lost")

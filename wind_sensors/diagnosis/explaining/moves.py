@@ -23,7 +23,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     times_beside,
     too_small,
 )
-from wind_sensors.diagnosis.explaining.bounds import run_away, without_spare
+from wind_sensors.diagnosis.explaining.bounds import without_spare
 from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Judged,
@@ -61,8 +61,6 @@ MOST_LOOKS = 4
 def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit from the best of the sizes around its own, while that is clearly better.
 
-    Not into the bounds of a parameter, where the fit would be given up.
-
     Args:
         searcher: The search.
         whitener: The null.
@@ -73,15 +71,8 @@ def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         cost, terms = min(costs, key=lambda pair: pair[0], default=(current.cost, ()))
         if cost > current.cost - ROUGHLY:
             return current
-        found = fit(whitener, searcher.station, terms, searcher.bank.without)
-        if _at_bounds(found) > _at_bounds(current):
-            return current
-        current = found
+        current = fit(whitener, searcher.station, terms, searcher.bank.without)
     return current
-
-
-def _at_bounds(found: Fit) -> int:
-    return sum(len(run_away(term)) for term in found.terms)
 
 
 def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
