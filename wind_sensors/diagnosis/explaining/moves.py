@@ -11,6 +11,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     ACCEPTED_FURTHER_GAIN,
     ACCEPTED_GAIN,
     all_plausible,
+    brought,
     inexact,
     inexactness,
     is_plausible,
@@ -325,7 +326,7 @@ def swapped(
         )
         if better is not None:
             losers.append(leader)
-            if not _brings_enough(searcher, whitener, without, better.fit):
+            if without.terms and not _brings_enough(searcher, without, better.fit):
                 fewer = fit(
                     whitener, searcher.station, others, searcher.bank.without, known=without
                 )
@@ -344,7 +345,7 @@ def swapped(
     return current, tuple(sorted(behind, key=lambda a: a.behind))
 
 
-def _brings_enough(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> bool:
+def _brings_enough(searcher: Searcher, fewer: Fit, more: Fit) -> bool:
     """Whether the newest term brings what a further one has to beside those before.
 
     What explains best what another one stood for may be the form of the effects beside it; then
@@ -352,11 +353,13 @@ def _brings_enough(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit
 
     Args:
         searcher: The search.
-        whitener: The null.
         fewer, more: An explanation, and one with the term.
     """
-    needed = inexactness(searcher, whitener, fewer, more)
-    return total(fewer) - total(seen_in(whitener, more)) >= needed
+    form = searcher.whitener(fewer.simulated, fewer)
+    before, after = seen_in(form, fewer), seen_in(form, more)
+    candidate = Judged(after, form, evidence(after, form))
+    gain = brought(searcher, candidate, before, evidence(before, form))
+    return gain >= inexactness(searcher, form, before, after)
 
 
 def _in_common(whitener: Whitener, rival: Judged, leader: Judged) -> float:
