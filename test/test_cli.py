@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from wind_sensors.cli import main as front
 from wind_sensors.cli.main import main
 from wind_sensors.recordings import write_recording
+from wind_sensors.recordings.writing import keep_inputs
 from wind_sensors.report import plots
 from wind_sensors.station.model import Cup, Input, Propeller, Reference, Station, Vane
 from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
@@ -87,6 +89,50 @@ def test_bad_input_is_a_message_and_status_2(
     told = capsys.readouterr().err
     assert told.startswith("wind info: ") and "Traceback" not in told
     assert main(["info"]) == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("process", "{r}", "-o", "{r}"),
+        ("process", "{r}", "-o", "{r}/bag"),
+        ("process", "{r}", "-o", "{r}/corrected"),
+        ("process", "{r}", "-o", "{link}"),
+        ("process", "{r}/bag", "--station", "{station}", "-o", "{r}"),
+        ("process", "{r}", "--station", "{other}/recording.yaml", "-o", "{other}"),
+        ("simulate", "{station}", "--wind", "{r}", "-o", "{r}"),
+        ("simulate", "{station}", "--follow", "{r}/bag", "-o", "{r}"),
+        ("simulate", "{r}/recording.yaml", "-o", "{r}"),
+        ("import", "{r}/bag/metadata.yaml", "--mapping", "nmea_yacht", "-o", "{r}"),
+        ("diagnose", "{r}", "--station", "{tmp}/station_corrected.yaml", "-o", "{tmp}"),
+        ("compare", "{tmp}/residuals", "-o", "{tmp}"),
+    ],
+    ids=" ".join,
+)
+def test_force_never_removes_what_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]
+) -> None:
+    recording = steady_recording(seconds=5.0)
+    folder = write_recording(tmp_path / "steady", recording)
+    other = write_recording(tmp_path / "other", recording)
+    write_recording(tmp_path / "residuals", recording)
+    for name in ("station.yaml", "station_corrected.yaml"):
+        shutil.copy(folder / "recording.yaml", tmp_path / name)
+    (tmp_path / "link").symlink_to(folder)
+    names = {
+        "r": folder, "other": other, "tmp": tmp_path, "link": tmp_path / "link",
+        "station": tmp_path / "station.yaml",
+    }  # fmt: skip
+    before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
+    assert main([*(text.format(**names) for text in arguments), "--force"]) == 2
+    assert "Name another folder with -o." in capsys.readouterr().err
+    assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
+
+
+def test_a_result_may_replace_what_is_not_read(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording(seconds=5.0))
+    for path in (tmp_path / "steady_wind", tmp_path / "nested" / "wind", tmp_path / "ste"):
+        keep_inputs(path, (folder, folder / "bag", "mast_cup_vane", None))
 
 
 def test_info_shows_topics_rates_station_and_notes(

@@ -46,7 +46,8 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> int:
     """Compare and write; 0 on success."""
-    make_way(options.output, NAMES, force=options.force)
+    inputs = (options.recording, options.station, *options.healthy, options.baseline)
+    make_way(options.output, NAMES, inputs=inputs, force=options.force)
     if options.baseline is not None and options.healthy:
         raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
     with Progress(console=Console(stderr=True), transient=True) as progress:

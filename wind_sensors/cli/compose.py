@@ -52,7 +52,10 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from wind_sensors.cli.record import show
     from wind_sensors.nodes import execution
+    from wind_sensors.recordings.writing import keep_inputs
 
+    if args.output:
+        keep_inputs(args.output, (args.station,))
     simulation: dict[str, object] = {
         "duration": args.duration,
         "speed": args.rate,

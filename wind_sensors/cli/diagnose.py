@@ -53,7 +53,8 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> int:
     """Diagnose and write; 0 whatever the verdict."""
     effects = catalogue_without(options.without)
-    make_way(options.output, force=options.force)
+    inputs = (options.recording, options.station, *options.healthy, options.baseline)
+    make_way(options.output, inputs=inputs, force=options.force)
     if options.baseline is not None and options.healthy:
         raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
     with Progress(console=Console(stderr=True), transient=True) as progress:

@@ -12,6 +12,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.importing import import_files, write_imported
 from wind_sensors.recordings.mapping import MappingFile, read_mapping
 from wind_sensors.recordings.station_files import configuration_folder
+from wind_sensors.recordings.writing import keep_inputs
 
 EPILOG = """\
 The mapping file says which column or sentence becomes which topic, type and field, in which unit
@@ -43,6 +44,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(options: argparse.Namespace) -> int:
     """Import the files; 0 on success."""
     console = Console(stderr=True)
+    keep_inputs(options.output, (*options.files, options.mapping))
     mapping_file = load_mapping(options.mapping)
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("reading", total=len(options.files) + 1)

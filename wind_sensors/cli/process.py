@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from wind_sensors.errors import UserError
 from wind_sensors.estimation import (
     METHODS,
     EstimatorSettings,
@@ -23,7 +22,7 @@ from wind_sensors.estimation import (
 )
 from wind_sensors.estimation.constants import measures_vertical
 from wind_sensors.recordings import read_recording, write_recording
-from wind_sensors.recordings.writing import clear_target
+from wind_sensors.recordings.writing import clear_target, keep_inputs
 
 _TERMS = {
     "u": "overspeeding (u)",
@@ -88,12 +87,7 @@ def run(args: argparse.Namespace) -> int:
         bandwidth=args.bandwidth,
         adaptation_time=args.adaptation_time,
     )
-    if Path(args.output).resolve() == Path(args.recording).resolve():
-        raise UserError(
-            "the result cannot replace the recording it comes from.",
-            args.output,
-            "Name another folder with -o.",
-        )
+    keep_inputs(args.output, (args.recording, args.station))
     if Path(args.output).exists() and not args.force:
         clear_target(Path(args.output), force=False)
     console = Console(stderr=True)

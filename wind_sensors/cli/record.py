@@ -47,11 +47,13 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.errors import UserError
     from wind_sensors.nodes import execution
     from wind_sensors.recordings import load_station
+    from wind_sensors.recordings.writing import keep_inputs
 
     if not (args.station or args.topics or args.all):
         raise UserError(
             "it is not said what to record.", remedy="Give --station FILE, --topics or --all."
         )
+    keep_inputs(args.output, (args.station,))
     station = load_station(args.station) if args.station else None
     made: list[RecorderNode] = []
 

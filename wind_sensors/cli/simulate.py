@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import velocity_from_direction, yaw_from_compass
 from wind_sensors.recordings import load_station, read_recording, write_recording
+from wind_sensors.recordings.writing import keep_inputs
 from wind_sensors.simulation.run import simulate
 from wind_sensors.simulation.scenario import Scenario, TransportFaults
 from wind_sensors.simulation.trajectories import CARRIERS, Trajectory
@@ -171,6 +172,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=True)
     if args.seed < 0:
         raise UserError("The seed must not be negative.", "--seed", "Use 0 or more.")
+    keep_inputs(args.output, (args.station, args.wind, args.follow))
     station = load_station(args.station)
     scenario = _scenario(args, station)
     begin = time.perf_counter()

@@ -91,11 +91,45 @@ def write_topics(
     return target
 
 
+def keep_inputs(
+    target: str | Path, inputs: Sequence[str | Path | None], *, may_lie_inside: bool = False
+) -> None:
+    """Refuse to write where that would remove or change what is read.
+
+    Args:
+        target: Folder that a command is going to write, and with --force to replace.
+        inputs: Recordings, bags and files that it reads; names of what ships and None are passed
+            over.
+        may_lie_inside: The target may lie in an input's folder, because it is no part of it.
+
+    Raises:
+        UserError: The target is one of the inputs, contains one or lies inside one, whatever the
+            way by symbolic links.
+    """
+    place = Path(target).resolve()
+    for given in inputs:
+        if given is None or not Path(given).exists():
+            continue
+        # The parts of a recording may be links to somewhere else.
+        parts = (Path(given), Path(given) / STATION_FILE, Path(given) / BAG_FOLDER)
+        for read in (part.resolve() for part in parts if part.exists()):
+            if place == read:
+                what = f"the result cannot replace {given}, which it comes from."
+            elif place in read.parents:
+                what = f"the result cannot replace the folder that holds {given}, which it reads."
+            elif read in place.parents and not may_lie_inside:
+                what = f"the result cannot go into {given}, which it comes from."
+            else:
+                continue
+            raise UserError(what, str(target), "Name another folder with -o.")
+
+
 def clear_target(target: Path, *, force: bool) -> None:
     """Make way for a recording.
 
     Raises:
-        UserError: Something is there and `force` is not given, or it is not a recording.
+        UserError: Something is there and `force` is not given, or it is not a recording or cannot
+            be removed.
     """
     if not target.exists():
         return
@@ -110,7 +144,14 @@ def clear_target(target: Path, *, force: bool) -> None:
             str(target),
             "Choose another place with -o.",
         )
-    shutil.rmtree(target)
+    try:
+        shutil.rmtree(target)
+    except OSError as problem:
+        raise UserError(
+            f"this cannot be removed ({problem.strerror or problem}).",
+            str(target),
+            "Choose another place with -o.",
+        ) from None
 
 
 def _write_bag(path: Path, topics: Sequence[TopicMessages]) -> None:

@@ -17,7 +17,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.station_files import shipped_profiles
-from wind_sensors.recordings.writing import write_topics
+from wind_sensors.recordings.writing import keep_inputs, write_topics
 from wind_sensors.report.diagnosis_page import page
 from wind_sensors.station.writing import station_to_yaml
 
@@ -26,11 +26,18 @@ NUMBER = "std_msgs/msg/Float64"
 NAMES = ("diagnosis.json", "report.html", "station_corrected.yaml", "residuals")
 
 
-def make_way(folder: Path, names: Sequence[str] = NAMES, *, force: bool) -> None:
+def make_way(
+    folder: Path,
+    names: Sequence[str] = NAMES,
+    *,
+    inputs: Sequence[str | Path | None] = (),
+    force: bool,
+) -> None:
     """Clear a folder of what a command wrote before.
 
     Raises:
-        UserError: Something is there and `force` is not given, or it is not a folder.
+        UserError: Something is there and `force` is not given, or it is not a folder, or what is
+            there is one of the command's inputs.
     """
     if folder.exists() and not folder.is_dir():
         raise UserError("this is no folder.", str(folder), "Choose another place with -o.")
@@ -39,6 +46,8 @@ def make_way(folder: Path, names: Sequence[str] = NAMES, *, force: bool) -> None
         raise UserError(
             "this exists already.", str(taken[0]), "Choose another place with -o, or add --force."
         )
+    for path in taken:
+        keep_inputs(path, inputs, may_lie_inside=True)
     for path in taken:
         if path.is_dir():
             shutil.rmtree(path)
