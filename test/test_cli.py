@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import Reader, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from wind_sensors.cli import main as front
 from wind_sensors.cli.main import main
@@ -133,6 +135,71 @@ def test_a_result_may_replace_what_is_not_read(tmp_path: Path) -> None:
     folder = write_recording(tmp_path / "steady", steady_recording(seconds=5.0))
     for path in (tmp_path / "steady_wind", tmp_path / "nested" / "wind", tmp_path / "ste"):
         keep_inputs(path, (folder, folder / "bag", "mast_cup_vane", None))
+
+
+OWN_TYPE = "lake_msgs/msg/Level"
+
+
+def with_others(folder: Path, *, of_a_type_of_its_own: bool) -> dict[str, list[tuple[int, bytes]]]:
+    """Add what a robot records besides to the bag of a recording; returns it by topic."""
+    defined = get_typestore(Stores.ROS2_JAZZY)
+    defined.register(get_types_from_msg("float64 metres\nstring gauge", OWN_TYPE))
+    level = defined.types[OWN_TYPE](metres=1.5, gauge="harbour")
+    text = defined.types["std_msgs/msg/String"](data="hello")
+    raw = {
+        "/talk": ("std_msgs/msg/String", bytes(defined.serialize_cdr(text, "std_msgs/msg/String")))
+    }
+    if of_a_type_of_its_own:
+        raw["/level"] = (OWN_TYPE, bytes(defined.serialize_cdr(level, OWN_TYPE)))
+    added: dict[str, list[tuple[int, bytes]]] = {name: [] for name in raw}
+    (folder / "bag").rename(folder / "before")
+    with Reader(folder / "before") as reader, Writer(folder / "bag", version=9) as writer:
+        made = {
+            c.id: writer.add_connection(c.topic, c.msgtype, typestore=defined)
+            for c in reader.connections
+        }
+        for connection, time, message in reader.messages():
+            writer.write(made[connection.id], time, message)
+        for name, (message_type, message) in raw.items():
+            connection = writer.add_connection(name, message_type, typestore=defined)
+            for k in range(3):
+                added[name].append((START + k * 1_500_000_000, message))
+                writer.write(connection, *added[name][-1])
+    shutil.rmtree(folder / "before")
+    return added
+
+
+def messages_of(bag: Path, topic: str) -> list[tuple[int, bytes]]:
+    with Reader(bag) as reader:
+        chosen = [c for c in reader.connections if c.topic == topic]
+        assert chosen
+        return [(time, bytes(raw)) for _, time, raw in reader.messages(connections=chosen)]
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_process_keeps_what_is_not_the_stations(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], damaged: bool
+) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording(seconds=10.0))
+    added = with_others(folder, of_a_type_of_its_own=not damaged)
+    if damaged:
+        (folder / "bag" / "metadata.yaml").unlink()
+    naive = ["--method", "naive", "--window", "5"]
+    assert main(["process", str(folder), "-o", str(tmp_path / "wind"), *naive]) == 0
+    assert "not copied" not in capsys.readouterr().out
+    for name, messages in added.items():
+        assert messages_of(tmp_path / "wind" / "bag", name) == messages
+    with Reader(tmp_path / "wind" / "bag") as reader:
+        times = [time for _, time, _ in reader.messages()]
+        assert times == sorted(times)
+        definitions = {c.msgtype: c.msgdef.data for c in reader.connections}
+    assert damaged or "string gauge" in definitions[OWN_TYPE]
+    again = ["process", str(tmp_path / "wind"), "-o", str(tmp_path / "again"), *naive]
+    assert main(again) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "this estimate's own topics take their place: /diagnostics, /wind, /wind/ap" in told
+    assert "/talk" not in told
+    assert messages_of(tmp_path / "again" / "bag", "/talk") == added["/talk"]
 
 
 def test_info_shows_topics_rates_station_and_notes(

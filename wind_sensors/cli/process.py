@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -21,8 +23,12 @@ from wind_sensors.estimation import (
     process,
 )
 from wind_sensors.estimation.constants import measures_vertical
-from wind_sensors.recordings import read_recording, write_recording
+from wind_sensors.recordings import write_recording
+from wind_sensors.recordings.bag import TopicData
+from wind_sensors.recordings.other_topics import OtherTopics
+from wind_sensors.recordings.reading import bag_of, open_recording, signals_of, station_topics
 from wind_sensors.recordings.writing import clear_target, keep_inputs
+from wind_sensors.station.signals import Recording
 
 _TERMS = {
     "u": "overspeeding (u)",
@@ -42,8 +48,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="signals to wind: corrected wind of a recording, with its uncertainty",
         description="Estimate the wind from a RECORDING's pulses and vane readings, and write a "
         "RECORDING whose bag carries the output topics (wind, wind/apparent, wind/mean, "
-        "wind/bias, ...) beside the raw ones. The same estimator runs in the live nodes and gives "
-        "the same numbers for the same messages.",
+        "wind/bias, ...) beside the raw ones; topics that are not the station's are copied as "
+        "they are. The same estimator runs in the live nodes and gives the same numbers for the "
+        "same messages.",
     )
     parser.add_argument(
         "recording", metavar="RECORDING", help="folder with recording.yaml and bag/, or a bag"
@@ -102,19 +109,35 @@ def run(args: argparse.Namespace) -> int:
         transient=True,
     ) as progress:
         task = progress.add_task("process", total=1.0)
-        recording = read_recording(args.recording, args.station)
+        recording, others = _read(args.recording, args.station)
         result = process(
             recording, settings, progress=lambda done: progress.update(task, completed=done)
         )
-    folder = write_recording(args.output, recording, outputs=result, force=args.force)
+    folder = write_recording(
+        args.output, recording, outputs=result, others=others, force=args.force
+    )
     out = Console(file=sys.stdout, width=None if sys.stdout.isatty() else 110)
-    _report(out, result)
+    _report(out, result, others.notes)
     print(f"wrote {folder}")
     return 0
 
 
-def _report(console: Console, result: ProcessedRecording) -> None:
-    for note in result.recording.notes:
+def _read(path: str, station_file: str | None) -> tuple[Recording, OtherTopics]:
+    """The recording, and what else is in its bag."""
+    content, station = open_recording(path, station_file)
+    recording = signals_of(content, station, Path(path).name or Path(path).resolve().name, path)
+    read = {topic for topic, data in content.topics.items() if data.raw}
+    named = {
+        topic: TopicData(data.message_type, count=data.count)
+        for topic, data in content.topics.items()
+    }
+    without_messages = replace(content, topics=named)
+    others = OtherTopics(bag_of(Path(path)), without_messages, read | station_topics(station))
+    return recording, others
+
+
+def _report(console: Console, result: ProcessedRecording, further: Sequence[str]) -> None:
+    for note in (*result.recording.notes, *further):
         console.print(f"note: {note}", highlight=False)
     for item in result.health:
         if item.level != HealthLevel.OK:

@@ -43,11 +43,13 @@ class BagContent:
         topics: By name.
         types: Definitions of all the types in the bag.
         notes: What was wrong with the bag.
+        salvaged: The bag is damaged, and this is what is left of it.
     """
 
     topics: dict[str, TopicData]
     types: Typestore
     notes: list[str] = field(default_factory=list)
+    salvaged: bool = False
 
     def topic(self, name: str, message_type: str, definition: MessageDefinition) -> TopicData:
         """The data of a topic, new where there is none; its type becomes known."""
@@ -110,7 +112,7 @@ def _read(path: Path, wanted: Callable[[str], bool]) -> BagContent:
 def _salvaged(path: Path, wanted: Callable[[str], bool], problem: Exception) -> BagContent:
     """What is left of a bag that its reader refuses."""
     files = [path] if path.is_file() else sorted(p for s in _SUFFIXES for p in path.glob(f"*{s}"))
-    content = BagContent({}, get_typestore(Stores.ROS2_JAZZY))
+    content = BagContent({}, get_typestore(Stores.ROS2_JAZZY), salvaged=True)
     if not files:
         content.notes.append(f"{problem}".rstrip("."))
     for file in files:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import shutil
 from collections import Counter
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.estimate_topics import estimate_topics
+from wind_sensors.recordings.other_topics import CopiedMessage, OtherTopics
 from wind_sensors.recordings.raw_topics import raw_topics
 from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.serialising import TopicMessages
@@ -30,6 +32,7 @@ def write_recording(
     recording: Recording,
     *,
     outputs: ProcessedRecording | Sequence[TopicMessages] = (),
+    others: OtherTopics | None = None,
     force: bool = False,
 ) -> Path:
     """Write a recording as a folder with `recording.yaml` and `bag/` (mcap, zstd).
@@ -39,6 +42,7 @@ def write_recording(
         recording: Station and signals; the signals go to the topics that the station names, the
             truth to `/truth/wind`.
         outputs: What an estimator found, or further messages.
+        others: Topics of the bag it was read from that are to be copied as they are.
         force: Replace a recording that is there.
 
     Returns:
@@ -52,11 +56,16 @@ def write_recording(
     topics = raw_topics(recording, types)
     topics += outputs if isinstance(outputs, Sequence) else estimate_topics(outputs, types)
     text = station_to_yaml(recording.station, shipped_profiles())
-    return write_topics(folder, text, topics, force=force)
+    return write_topics(folder, text, topics, others=others, force=force)
 
 
 def write_topics(
-    folder: str | Path, station_text: str, topics: Sequence[TopicMessages], *, force: bool = False
+    folder: str | Path,
+    station_text: str,
+    topics: Sequence[TopicMessages],
+    *,
+    others: OtherTopics | None = None,
+    force: bool = False,
 ) -> Path:
     """Write serialised messages and the text of their station file as a recording.
 
@@ -79,7 +88,7 @@ def write_topics(
             shutil.rmtree(partial)
         partial.mkdir(parents=True)
         (partial / STATION_FILE).write_text(station_text, encoding="utf-8")
-        _write_bag(partial / BAG_FOLDER, topics)
+        _write_bag(partial / BAG_FOLDER, topics, others)
         partial.rename(target)
     except OSError as problem:
         shutil.rmtree(partial, ignore_errors=True)
@@ -154,7 +163,9 @@ def clear_target(target: Path, *, force: bool) -> None:
         ) from None
 
 
-def _write_bag(path: Path, topics: Sequence[TopicMessages]) -> None:
+def _write_bag(
+    path: Path, topics: Sequence[TopicMessages], others: OtherTopics | None
+) -> None:
     types = typestore()
     filled = [topic for topic in topics if len(topic.raw)]
     time = np.concatenate([np.empty(0, dtype=np.int64), *(topic.time for topic in filled)])
@@ -169,5 +180,11 @@ def _write_bag(path: Path, topics: Sequence[TopicMessages]) -> None:
             for topic in filled
         ]
         columns = (part[order].tolist() for part in (owner, index, time))
-        for who, which, when in zip(*columns, strict=True):
-            writer.write(connections[who], when, filled[who].raw[which])
+        own = (
+            CopiedMessage(when, connections[who], filled[who].raw[which])
+            for who, which, when in zip(*columns, strict=True)
+        )
+        names = {topic.topic for topic in topics}
+        further = iter(()) if others is None else others.into(writer, names)
+        for message in heapq.merge(own, further, key=lambda message: message.time):
+            writer.write(message.connection, message.time, message.raw)
