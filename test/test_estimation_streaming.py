@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from wind_sensors.estimation import EstimatorSettings, HealthLevel, make_estimat
 from wind_sensors.estimation.core import Estimates
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Station
-from wind_sensors.station.signals import Recording, Winds
+from wind_sensors.station.signals import Angles, Recording, Winds
 
 SETTINGS = EstimatorSettings(window=20.0)
 
@@ -269,6 +270,39 @@ def test_a_station_without_vane_is_refused_with_a_remedy() -> None:
     lonely = station.model_copy(update={"instruments": station.instruments[:1]})
     with pytest.raises(UserError, match="vane"):
         make_estimator(lonely)
+
+
+@pytest.mark.parametrize(
+    ("silent", "what"), [("vane", "direction"), ("cup", "speed")], ids=["vane", "cup"]
+)
+def test_what_was_never_heard_makes_no_wind(recording: Recording, silent: str, what: str) -> None:
+    empty = np.empty(0, dtype=np.int64)
+    for unusable in ({}, {silent: Angles(empty, np.empty(0))}):
+        pulses = {} if silent == "cup" else recording.pulses
+        angles = {} if silent == "vane" else recording.angles
+        lacking = replace(recording, pulses=pulses, angles={**angles, **unusable})
+        with pytest.raises(UserError, match=f"'{silent}' .*/.*the wind's {what} is not known"):
+            process(lacking)
+    estimator = make_estimator(recording.station)
+    stream = messages(recording)
+    feed(estimator, [m for m in stream if m[1] != silent])
+    assert not estimator.take_estimates(), "a wind before its instrument was heard is invented"
+    estimator.flush()
+    assert not estimator.take_estimates()
+    assert not [w for w in estimator.take_windows() if w.complete > 0.0]
+
+
+def test_a_vane_that_comes_late_starts_the_estimate(recording: Recording) -> None:
+    estimator = make_estimator(recording.station)
+    first = recording.start + 25_000_000_000
+    feed(estimator, [m for m in messages(recording) if m[1] != "vane" or m[2] >= first])
+    estimator.flush()
+    found = estimator.take_estimate_arrays()
+    assert found.time.size
+    assert found.time[0] > first - 2_000_000_000, "no wind before its direction was heard"
+    settled = found.time > first + 5_000_000_000
+    error = found.velocity[settled, :2] - truth_at(recording, found.time[settled])[:, :2]
+    assert np.sqrt(np.mean(np.square(error))) < 0.5
 
 
 def test_settings_out_of_range_name_themselves() -> None:

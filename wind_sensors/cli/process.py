@@ -143,7 +143,9 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
         if item.level != HealthLevel.OK:
             console.print(f"{item.level.name.lower()}: {item.name}: {item.message}")
     if not result.windows:
-        console.print("No estimate: the recording is too short.")
+        troubled = any(item.level >= HealthLevel.ERROR for item in result.health)
+        reason = "for the reasons above" if troubled else "the recording is too short"
+        console.print(f"No estimate: {reason}.")
         return
     start = result.recording.start
     table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")

@@ -171,6 +171,7 @@ class KalmanCore:
         self._source.take(block)
         if not self._started:
             self._waiting.append(block)
+            self._forget_early()
             if not self._ready():
                 return no_estimates()
             waiting, self._waiting = self._waiting, []
@@ -180,12 +181,33 @@ class KalmanCore:
         return self._run(block)
 
     def _ready(self) -> bool:
+        if not self._tells_a_vector():
+            return False
         since = self._waiting[-1].stop - self._waiting[0].start
         heard = self._source.known and all(
             any(n in b.readings and b.readings[n].time.size for b in self._waiting)
             for n in self.vane_names
         )
         return since >= (_WARM_UP_NS if heard else _LONGEST_WARM_UP_NS)
+
+    def _is_pointed(self, block: Block) -> bool:
+        """Whether a block tells a direction: a vane was read, or fixed propellers tell it."""
+        azimuths = [axis.name for axis in self._axes if axis.azimuth < 0]
+        return not azimuths or any(block.readings[name].time.size for name in azimuths)
+
+    def _tells_a_vector(self) -> bool:
+        """Whether speed and direction were heard of; before that any wind would be invented."""
+        turned = any(b.pulses[name].time.size for b in self._waiting for name in self.rotor_names)
+        return turned and any(map(self._is_pointed, self._waiting))
+
+    def _forget_early(self) -> None:
+        """Leave out what came before the first direction, and more than the start looks at."""
+        while self._waiting and not self._is_pointed(self._waiting[0]):
+            del self._waiting[0]
+        while self._waiting and (
+            self._waiting[-1].stop - self._waiting[0].start > _LONGEST_WARM_UP_NS + self._block
+        ):
+            del self._waiting[0]
 
     def _start(self, blocks: list[Block]) -> None:
         first = blocks[0].start
@@ -350,7 +372,10 @@ class KalmanCore:
         if not self._started:
             if not self._waiting:
                 return no_estimates()
+            told = self._tells_a_vector()
             waiting, self._waiting = self._waiting, []
+            if not told:
+                return no_estimates()
             self._start(waiting)
             parts = [self._run(b) for b in waiting]
             parts.append(self.finish())

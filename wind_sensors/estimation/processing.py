@@ -9,9 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
+from wind_sensors.estimation.constants import axes_of, rotors_of
 from wind_sensors.estimation.outputs import ProcessedRecording
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.streaming import StreamingEstimator, make_estimator
+from wind_sensors.station.inputs import angle_inputs
+from wind_sensors.station.model import Angle
 from wind_sensors.station.signals import Recording
 
 TimeArray = npt.NDArray[np.int64]
@@ -106,6 +109,34 @@ def _in_order(
             yield inputs[k][1], i
 
 
+def _must_tell_a_vector(recording: Recording) -> None:
+    """Refuse a recording in which speed or direction was never measured.
+
+    Raises:
+        UserError: No rotor, no vane or no elevation was ever heard of.
+    """
+    station = recording.station
+    axes = axes_of(station)
+    topics = {r.name: r.pulses.topic for r in rotors_of(station)}
+    for angle in station.instruments:
+        if isinstance(angle, Angle):
+            topics |= {name: source.topic for name, source in angle_inputs(angle).items()}
+    heard = {name for name, p in recording.pulses.items() if p.time.size}
+    heard |= {name for name, a in recording.angles.items() if a.time.size}
+    for names, what in (
+        ([r.name for r in rotors_of(station)], "speed"),
+        ([axis.name for axis in axes if axis.azimuth < 0], "direction"),
+        ([axis.name for axis in axes if axis.azimuth >= 0], "elevation"),
+    ):
+        if names and not heard.intersection(names):
+            named = ", ".join(f"'{name}' ({topics[name]})" for name in names)
+            raise UserError(
+                f"nothing usable was heard of {named}, so the wind's {what} is not known.",
+                recording.name,
+                "Check the instrument, the recorder and the topic in the station file.",
+            )
+
+
 def process(
     recording: Recording,
     settings: EstimatorSettings | None = None,
@@ -122,7 +153,7 @@ def process(
         All estimates, windows and the health at the end.
 
     Raises:
-        UserError: The station lacks a rotor or a vane, or the recording has no signals.
+        UserError: The station lacks a rotor or a vane, or the recording has no signals of them.
     """
     chosen = settings if settings is not None else EstimatorSettings()
     estimator = make_estimator(recording.station, chosen)
@@ -130,6 +161,7 @@ def process(
     total = sum(int(time.size) for time, _ in inputs)
     if total == 0:
         raise UserError("The recording has no signals of its station.", recording.name)
+    _must_tell_a_vector(recording)
     for done, (feed, index) in enumerate(_in_order(inputs, round(chosen.jump_time * 1e9))):
         feed(index)
         if done % 4096 == 0 and progress is not None:
