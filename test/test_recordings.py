@@ -19,6 +19,7 @@ from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.writing import write_topics
+from wind_sensors.station.inputs import TurnCounter
 from wind_sensors.station.model import (
     Air,
     Bivane,
@@ -210,6 +211,47 @@ def test_a_counter_that_restarts_counts_on(tmp_path: Path) -> None:
     assert turns is not None
     assert turns.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert any("restarted 1 times" in note for note in after.notes)
+
+
+@pytest.mark.parametrize(
+    ("stated", "values"),
+    [
+        (65536, [250, 254, 2, 6, 10]),
+        (512, [250, 254, 2, 6, 10]),
+        (65536, [40000, 40004, 0, 4, 8]),
+        (65536, [20000, 20004, 0, 4, 8]),
+        (None, [10, 14, 900_000, 900_004, 900_008]),
+    ],
+)
+def test_a_step_that_no_wind_makes_is_told_and_left_out(
+    tmp_path: Path, stated: int | None, values: list[float]
+) -> None:
+    after = counter(
+        tmp_path, values, Input(topic="/c", type="std_msgs/msg/Int32", modulus=stated)
+    )
+    turns = after.pulses["cup"].turns
+    assert turns is not None
+    assert turns.tolist() == [0.0, 1.0, 1.0, 2.0, 3.0]
+    (note,) = after.notes
+    assert note.startswith(
+        f"/c: 1 steps that no wind turns 'cup' to were left out (the first at 2.000 s, from "
+        f"{values[1]:g} to {values[2]:g})"
+    )
+    assert "`modulus`" in note
+
+
+def test_counters_that_are_right_are_left_alone(tmp_path: Path) -> None:
+    source = Input(topic="/c", type="std_msgs/msg/Int32", modulus=256)
+    right = counter(tmp_path, [200, 230, 4, 34, 33, 64], source)
+    assert right.notes == ()
+    turns = right.pulses["cup"].turns
+    assert turns is not None
+    assert turns.tolist() == [0.0, 7.5, 15.0, 22.5, 22.25, 30.0]
+    # A gap, and messages that wait for each other and then come at once.
+    counting = TurnCounter(source.model_copy(update={"meaning": "count"}), cup(source))
+    for second, value in ((0, 0), (60, 120), (60, 125)):
+        reading = counting.add(second * 1_000_000_000, value)
+        assert reading is not None and not reading.jumped
 
 
 def test_a_propeller_angle_may_turn_backwards(tmp_path: Path) -> None:

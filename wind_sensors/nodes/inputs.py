@@ -56,6 +56,7 @@ class TopicCount:
     received: int = 0
     without_stamp: int = 0
     not_numbers: int = 0
+    implausible: int = 0
     unusable: int = 0
     problem: str = ""
     purposes: list[str] = field(default_factory=list)
@@ -150,6 +151,7 @@ class EstimatorInputs:
                 for number, what in (
                     (count.without_stamp, "without a stamp"),
                     (count.not_numbers, "not a number"),
+                    (count.implausible, "not plausible (check `modulus` or the unit)"),
                     (count.unusable, f"unusable ({count.problem})"),
                 )
                 if number
@@ -170,6 +172,7 @@ class EstimatorInputs:
                     "received": str(count.received),
                     "without stamp": str(count.without_stamp),
                     "not numbers": str(count.not_numbers),
+                    "not plausible": str(count.implausible),
                     "unusable": str(count.unusable),
                 },
             )
@@ -235,6 +238,7 @@ class EstimatorInputs:
             if reading is None:
                 count.not_numbers += 1
             else:
+                count.implausible += reading.jumped
                 self.estimator.add_pulse(name, time, reading.turns)
 
         return {"edge": edge, "edges": edges}.get(source.meaning, turns)

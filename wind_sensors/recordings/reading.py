@@ -234,10 +234,21 @@ class _SignalReader:
             self._note_order(source.topic, time)
             return Pulses(time)
         time, raw = self._numbers(source, data, path)
-        turns, restarts = turns_from_raw(source, rotor, time.tolist(), raw.tolist())
-        if restarts:
-            self.notes.append(f"{source.topic}: the counter restarted {restarts} times")
-        return Pulses(time, turns)
+        counted = turns_from_raw(source, rotor, time.tolist(), raw.tolist())
+        if counted.restarts:
+            wraps = "" if counted.restarts == 1 else "; if it wraps, state `modulus`"
+            self.notes.append(
+                f"{source.topic}: the counter restarted {counted.restarts} times{wraps}"
+            )
+        if counted.jumps:
+            first = counted.jumps[0]
+            at = (int(time[first]) - int(time[0])) * 1e-9
+            self.notes.append(
+                f"{source.topic}: {len(counted.jumps)} steps that no wind turns '{rotor.name}' to "
+                f"were left out (the first at {at:.3f} s, from {raw[first - 1]:g} to "
+                f"{raw[first]:g}); check `modulus`, or the source has restarted"
+            )
+        return Pulses(time, counted.turns)
 
     def angles(self, vane: Angle, signal: str, source: Input) -> Angles | None:
         data = self._topic(source, f"the angle of '{signal}'")

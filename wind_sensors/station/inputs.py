@@ -169,16 +169,28 @@ def raw_from_angles(source: Input, angle: FloatArray) -> FloatArray:
     return np.asarray(table[nearest, 0], dtype=np.float64)
 
 
+FASTEST_WIND = 120.0
+"""No wind turns a rotor faster [m/s]; the strongest gust that was measured had 113 m/s."""
+_BURST = 1.0
+"""Messages without a stamp of their own may come this much closer than they were sent [s]."""
+_BACKWARDS_BURST = 0.2
+"""The same for a propeller that turns backwards [s]."""
+_TREMBLE = 1.0
+"""A cup that stands may swing back by as much [turns]."""
+
+
 class TurnReading(NamedTuple):
     """What one rotor message told.
 
     Attributes:
         turns: Revolutions since the first message.
         restarted: The source went back and was taken to have restarted from zero.
+        jumped: The source stepped as no wind turns the rotor; the step was left out.
     """
 
     turns: float
     restarted: bool
+    jumped: bool = False
 
 
 class TurnCounter:
@@ -224,12 +236,31 @@ class TurnCounter:
                 if self._source.meaning == "count"
                 else 2.0 * np.pi
             )
-            self._turns += step / per_turn
+            turns = step / per_turn
         elif self._previous is not None:
-            seconds = max(time_ns - self._previous_ns, 0) * 1e-9
-            self._turns += self._turn_rate(value) * seconds
+            turns = self._turn_rate(value) * max(time_ns - self._previous_ns, 0) * 1e-9
+        else:
+            turns = 0.0
+        jumped = not self._is_possible(turns, time_ns)
+        if not jumped:
+            self._turns += turns
         self._previous, self._previous_ns = value, time_ns
-        return TurnReading(float(self._turns), restarted)
+        return TurnReading(float(self._turns), restarted and not jumped, jumped)
+
+    def _is_possible(self, turns: float, time_ns: int) -> bool:
+        """Whether some wind turns the rotor so far between the message before and this one."""
+        seconds = (time_ns - self._previous_ns) * 1e-9
+        if self._previous is None or seconds < 0.0:
+            # What came late takes back what the messages after it have counted.
+            return True
+        fastest = FASTEST_WIND / (2.0 * np.pi * self._rotor.calibration_distance)
+        if self._source.meaning not in {"count", "angle"}:
+            return bool(abs(turns) <= fastest * seconds)
+        if turns >= 0.0:
+            return bool(turns <= fastest * (seconds + _BURST) + _TREMBLE)
+        if isinstance(self._rotor, Cup) and self._source.meaning == "count":
+            return seconds == 0.0 or bool(-turns <= _TREMBLE)
+        return bool(-turns <= fastest * (seconds + _BACKWARDS_BURST) + _TREMBLE)
 
     def _turn_rate(self, value: float) -> float:
         if self._source.meaning == "frequency":
@@ -242,9 +273,23 @@ class TurnCounter:
         return spinning / (2.0 * np.pi * self._rotor.calibration_distance)
 
 
+class CountedTurns(NamedTuple):
+    """What all messages of a rotor told.
+
+    Attributes:
+        turns: Revolutions at each stamp, NaN where the value was not a number.
+        restarts: How often the source restarted from zero.
+        jumps: Indices of the messages whose step was left out.
+    """
+
+    turns: FloatArray
+    restarts: int
+    jumps: tuple[int, ...]
+
+
 def turns_from_raw(
     source: Input, rotor: Cup | Propeller, time: Iterable[int], raw: Iterable[float]
-) -> tuple[FloatArray, int]:
+) -> CountedTurns:
     """`TurnCounter` over whole arrays.
 
     Args:
@@ -252,19 +297,18 @@ def turns_from_raw(
         rotor: The rotor.
         time: Stamps [ns].
         raw: Values of the field.
-
-    Returns:
-        Revolutions at each stamp (NaN where the value was not a number) and the number of
-        restarts.
     """
     counter = TurnCounter(source, rotor)
     turns: list[float] = []
     restarts = 0
-    for stamp, value in zip(time, raw, strict=True):
+    jumps: list[int] = []
+    for index, (stamp, value) in enumerate(zip(time, raw, strict=True)):
         reading = counter.add(int(stamp), float(value))
         turns.append(float("nan") if reading is None else reading.turns)
-        restarts += reading is not None and reading.restarted
-    return np.asarray(turns, dtype=np.float64), restarts
+        if reading is not None:
+            restarts += reading.restarted
+            jumps += [index] if reading.jumped else []
+    return CountedTurns(np.asarray(turns, dtype=np.float64), restarts, tuple(jumps))
 
 
 def raw_from_turns(
