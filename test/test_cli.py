@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,8 @@ from wind_sensors.cli.main import main
 from wind_sensors.recordings import write_recording
 from wind_sensors.recordings.writing import keep_inputs
 from wind_sensors.report import plots
-from wind_sensors.station.model import Cup, Input, Propeller, Reference, Station, Vane
-from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
+from wind_sensors.station.model import Air, Cup, Input, Propeller, Reference, Station, Vane
+from wind_sensors.station.signals import Angles, Pulses, Recording, Series, Winds
 
 START = 1_767_225_600_000_000_000
 SLOTS = (0.02, -0.01, 0.0, -0.01)
@@ -200,6 +201,22 @@ def test_process_keeps_what_is_not_the_stations(
     assert "this estimate's own topics take their place: /diagnostics, /wind, /wind/ap" in told
     assert "/talk" not in told
     assert messages_of(tmp_path / "again" / "bag", "/talk") == added["/talk"]
+
+
+def test_process_keeps_the_messages_of_a_signal_that_it_cannot_use(tmp_path: Path) -> None:
+    kelvin = steady_recording(seconds=10.0)
+    air = Air(temperature=Input(topic="/air/temperature"))
+    time = START + np.arange(10, dtype=np.int64) * 1_000_000_000
+    kelvin = replace(
+        kelvin,
+        station=kelvin.station.model_copy(update={"air": air}),
+        temperature=Series(time, np.full(10, 288.15)),
+    )
+    folder = write_recording(tmp_path / "kelvin", kelvin)
+    process = ["process", str(folder), "-o", str(tmp_path / "wind"), "--method", "naive"]
+    assert main(process) == 0
+    topic = "/air/temperature"
+    assert messages_of(tmp_path / "wind" / "bag", topic) == messages_of(folder / "bag", topic)
 
 
 def test_info_shows_topics_rates_station_and_notes(

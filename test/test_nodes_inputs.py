@@ -12,7 +12,8 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Header
+from sensor_msgs.msg import FluidPressure, Temperature
+from std_msgs.msg import Header, Int64
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import EstimatorInputs
@@ -174,6 +175,25 @@ def test_air_arrives_with_its_units(tmp_path: Path) -> None:
     pressures = [value for _, _, value in heard.air if value is not None]
     np.testing.assert_array_equal(temperatures, offline.temperature.value)
     np.testing.assert_array_equal(pressures, offline.pressure.value)
+
+
+def test_air_and_counts_that_cannot_be_are_left_out_and_counted(tmp_path: Path) -> None:
+    counter = "{topic: /p, type: std_msgs/msg/Int64, modulus: 65536}"
+    more = "air: {temperature: /t, pressure: /q}\n"
+    station = _station(tmp_path, CUP % counter, VANE % "/v", more=more)
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: 5)
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    receive["/t"](Temperature(temperature=288.15))
+    receive["/q"](FluidPressure(fluid_pressure=1013.0))
+    for value in (40_000, 40_004, 0):
+        receive["/p"](Int64(data=value))
+    assert not heard.air
+    assert {topic: inputs.counts[topic].implausible for topic in ("/t", "/q", "/p")} == {
+        "/t": 1, "/q": 1, "/p": 1,
+    }  # fmt: skip
+    told = {s.name: s.message for s in inputs.statuses()}
+    assert "1 not plausible" in told["topic /t"] and "`scale`" in told["topic /t"]
 
 
 def test_edges_without_a_stamp_are_left_out_and_counted(tmp_path: Path) -> None:

@@ -254,6 +254,34 @@ def test_counters_that_are_right_are_left_alone(tmp_path: Path) -> None:
         assert reading is not None and not reading.jumped
 
 
+@pytest.mark.parametrize(
+    ("signal", "unit", "wrong", "remedy"),
+    [
+        ("temperature", 15.0, 288.15, "`offset: -273.15`"),
+        ("pressure", 101_300.0, 1013.0, "`scale: 100`"),
+    ],
+)
+def test_air_in_another_unit_is_told_and_not_used(
+    tmp_path: Path, signal: str, unit: float, wrong: float, remedy: str
+) -> None:
+    time = START + np.arange(4, dtype=np.int64) * 1_000_000_000
+    air = Air.model_validate({signal: {"topic": f"/{signal}"}})
+    station = Station(instruments=(cup(Input(topic="/c")),), air=air)
+
+    def after(name: str, values: list[float]) -> Recording:
+        series = Series(time, np.asarray(values))
+        recording = recorded(station, pulses={"cup": Pulses(time)}, **{signal: series})
+        return read_recording(write_recording(tmp_path / name, recording))
+
+    assert after("right", [unit] * 4).notes == ()
+    mixed = after("mixed", [unit, wrong, unit, unit])
+    assert getattr(mixed, signal).value.tolist() == [unit] * 3
+    (note,) = mixed.notes
+    assert note.startswith(f"/{signal}: 1 of 4 values are no {signal} of the air in ")
+    assert f"{wrong:g}" in note and remedy in note
+    assert getattr(after("wrong", [wrong] * 4), signal) is None
+
+
 def test_a_propeller_angle_may_turn_backwards(tmp_path: Path) -> None:
     source = Input(topic="/c", type="std_msgs/msg/Float64", meaning="angle", scale=0.5)
     turns = counter(tmp_path, [0.0, 8 * np.pi, 4 * np.pi], source).pulses["cup"].turns

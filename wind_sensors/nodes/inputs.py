@@ -19,12 +19,14 @@ from wind_sensors.errors import UserError
 from wind_sensors.nodes.diagnostics import Level, Status
 from wind_sensors.nodes.platform import ImuWithTwist, odometry_state
 from wind_sensors.station.inputs import (
+    AirSignal,
     FieldPath,
     TurnCounter,
     angle_inputs,
     angles_from_raw,
     field_path,
     field_value,
+    is_plausible,
     resolved,
     scaled,
 )
@@ -151,7 +153,7 @@ class EstimatorInputs:
                 for number, what in (
                     (count.without_stamp, "without a stamp"),
                     (count.not_numbers, "not a number"),
-                    (count.implausible, "not plausible (check `modulus` or the unit)"),
+                    (count.implausible, "not plausible (check `modulus`, `scale` and `offset`)"),
                     (count.unusable, f"unusable ({count.problem})"),
                 )
                 if number
@@ -263,26 +265,41 @@ class EstimatorInputs:
             self._add(source, "air pressure", self._pressure(source))
 
     def _temperature(self, source: Input) -> Handler:
-        number = self._number(source)
+        number = self._air(source, "temperature")
 
         def temperature(message: Any, stamp: int) -> None:
-            raw = number(message)
-            if raw is not None:
-                value = float(scaled(source, raw)[0])
+            value = number(message)
+            if value is not None:
                 self.estimator.add_air(stamp or self._now(), temperature=value)
 
         return temperature
 
     def _pressure(self, source: Input) -> Handler:
-        number = self._number(source)
+        number = self._air(source, "pressure")
 
         def pressure(message: Any, stamp: int) -> None:
-            raw = number(message)
-            if raw is not None:
-                value = float(scaled(source, raw)[0])
+            value = number(message)
+            if value is not None:
                 self.estimator.add_air(stamp or self._now(), pressure=value)
 
         return pressure
+
+    def _air(self, source: Input, signal: AirSignal) -> Callable[[Any], float | None]:
+        """Value in deg C or Pa; None, and counted, where the air cannot have it."""
+        number = self._number(source)
+        count = self.counts[source.topic]
+
+        def air(message: Any) -> float | None:
+            raw = number(message)
+            if raw is None:
+                return None
+            value = scaled(source, raw)
+            if not is_plausible(signal, value)[0]:
+                count.implausible += 1
+                return None
+            return float(value[0])
+
+        return air
 
     def _number(self, source: Input) -> Callable[[Any], np.ndarray[Any, Any] | None]:
         path = _checked_path(source)

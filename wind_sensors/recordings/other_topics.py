@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -37,13 +37,14 @@ class OtherTopics:
     Attributes:
         bag: The bag.
         content: What was read from it.
-        station: Topics of the station; they are written from the signals.
+        station: Topics of the station; they are written from the signals as far as those are
+            usable.
         notes: What was not copied, and why; complete once every message was asked for.
     """
 
     bag: Path
     content: BagContent
-    station: Collection[str]
+    station: Set[str]
     notes: list[str] = field(default_factory=list)
 
     def into(self, writer: Writer, written: Collection[str]) -> Iterator[CopiedMessage]:
@@ -74,9 +75,10 @@ class OtherTopics:
             self.notes.append(f"{self.bag}: topics that are not the station's end early: {problem}")
 
     def _copied(self, written: Collection[str]) -> set[str]:
-        """Topics to copy: not the station's, nor what an earlier estimate left."""
+        """Topics to copy: neither written from signals, nor what an earlier estimate left."""
         topics = self.content.topics
-        others = {name for name in topics if name not in self.station and topics[name].count}
+        done = self.station & set(written)
+        others = {name for name in topics if name not in done and topics[name].count}
         before = WIND_TOPIC in topics and topics[WIND_TOPIC].message_type == WIND_TYPE
         replaced = {
             name

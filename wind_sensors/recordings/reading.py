@@ -16,12 +16,15 @@ from wind_sensors.recordings.platform import platform_states
 from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
 from wind_sensors.recordings.station_files import load_station
 from wind_sensors.station.inputs import (
+    AIR_RANGES,
+    AirSignal,
     FieldPath,
     Signal,
     absolute,
     angle_inputs,
     angles_from_raw,
     field_path,
+    is_plausible,
     resolved,
     scaled,
     turns_from_raw,
@@ -190,8 +193,8 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
     truth_topic = next((t for t in content.topics if t.endswith(TRUTH_TOPIC)), None)
     truth = reader.winds(Input(topic=truth_topic)) if truth_topic else None
     platform = platform_states(station, content, reader.notes) if station.platform else None
-    temperature = reader.series(station.air.temperature, "temperature")
-    pressure = reader.series(station.air.pressure, "pressure")
+    temperature = reader.air(station.air.temperature, "temperature")
+    pressure = reader.air(station.air.pressure, "pressure")
     start, stop = _span(content, pulses, angles, reference, platform)
     return Recording(
         name=name,
@@ -266,6 +269,22 @@ class _SignalReader:
             return None
         time, raw = self._numbers(source, data, field_path(source.field))
         return Series(time, scaled(source, raw))
+
+    def air(self, stated: Input | None, signal: AirSignal) -> Series | None:
+        """Temperature or pressure; what the air cannot have is left out, as if not measured."""
+        found = self.series(stated, signal)
+        if found is None or stated is None:
+            return None
+        plausible = is_plausible(signal, found.value)
+        bad = int(np.count_nonzero(~plausible))
+        if bad:
+            limits = AIR_RANGES[signal]
+            self.notes.append(
+                f"{stated.topic}: {bad} of {len(found.value)} values are no {signal} of the air in "
+                f"{limits.unit} and were left out (the first: {found.value[~plausible][0]:g}); "
+                f"{limits.remedy} in the station file"
+            )
+        return Series(found.time[plausible], found.value[plausible]) if plausible.any() else None
 
     def winds(self, stated: Input) -> Winds | None:
         source = resolved(stated, "wind")

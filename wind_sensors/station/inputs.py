@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Vane
@@ -138,6 +139,37 @@ def field_value(message: Any, path: FieldPath) -> Any:
 def scaled(source: Input, raw: FloatArray) -> FloatArray:
     """scale * raw + offset."""
     return np.asarray(source.scale * raw + source.offset, dtype=np.float64)
+
+
+AirSignal = Literal["temperature", "pressure"]
+
+
+class AirRange(NamedTuple):
+    """Where a quantity of the air lies anywhere a wind sensor works.
+
+    Attributes:
+        least, most: In `unit`.
+        unit: E.g. `Pa`.
+        remedy: What to write in the station file for the units that are usual otherwise.
+    """
+
+    least: float
+    most: float
+    unit: str
+    remedy: str
+
+
+AIR_RANGES: dict[AirSignal, AirRange] = {
+    "temperature": AirRange(-95.0, 65.0, "deg C", "for kelvin write `offset: -273.15`"),
+    "pressure": AirRange(10_000.0, 115_000.0, "Pa", "for hPa write `scale: 100`"),
+}
+"""From the coldest to the hottest place on earth, and from 16 km up to below the sea's level."""
+
+
+def is_plausible(signal: AirSignal, value: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether the air can have these values [deg C or Pa]; same shape."""
+    limits = AIR_RANGES[signal]
+    return np.asarray((value >= limits.least) & (value <= limits.most), dtype=np.bool_)
 
 
 def angles_from_raw(source: Input, raw: FloatArray) -> FloatArray:
