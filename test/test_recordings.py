@@ -424,8 +424,13 @@ def test_a_damaged_sqlite_bag_gives_what_is_left(tmp_path: Path) -> None:
 def test_refusals_say_what_to_do(tmp_path: Path, small: Path) -> None:
     with pytest.raises(UserError, match="no such recording"):
         read_recording(tmp_path / "nothing")
-    with pytest.raises(UserError, match="--station"):
-        read_recording(small / "bag")
+    shutil.copytree(small / "bag", tmp_path / "alone" / "bag")
+    for lonely in ("alone", "alone/bag"):
+        with pytest.raises(UserError, match="--station"):
+            read_recording(tmp_path / lonely)
+    (tmp_path / "void").mkdir()
+    with pytest.raises(UserError, match=r"void: this folder is empty.*recording\.yaml and bag/"):
+        read_recording(tmp_path / "void")
     other = tmp_path / "other.yaml"
     other.write_text(station_to_yaml(Station(instruments=(cup(Input(topic="/x")),))))
     with pytest.raises(UserError, match=r"none of the station's topics.*/cup/pulses"):
@@ -438,6 +443,19 @@ def test_refusals_say_what_to_do(tmp_path: Path, small: Path) -> None:
     other.write_text(station_to_yaml(text))
     with pytest.raises(UserError, match="not a number"):
         read_recording(small, other)
+
+
+def test_the_bag_of_a_recording_stands_for_it(
+    small: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = read_recording(small)
+    (file,) = (small / "bag").glob("*.mcap")
+    monkeypatch.chdir(small / "bag")
+    for path in (small / "bag", file, Path()):
+        found = read_recording(path)
+        assert found.name == whole.name == "small"
+        assert found.station == whole.station
+        assert np.array_equal(found.pulses["cup"].time, whole.pulses["cup"].time)
 
 
 def test_nothing_is_overwritten_without_force_and_only_recordings_with_it(

@@ -13,7 +13,7 @@ from rich.table import Table
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
 from wind_sensors.recordings.mapping import mapping_markdown
-from wind_sensors.recordings.reading import open_recording, signals_of
+from wind_sensors.recordings.reading import name_of, open_recording, signals_of
 from wind_sensors.recordings.station_files import (
     configuration_folder,
     load_station,
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         _print_station(console, load_station(path))
         return 0
     content, station = open_recording(path, options.station)
-    recording = signals_of(content, station, path.resolve().name, str(path))
+    recording = signals_of(content, station, name_of(path), str(path))
     seconds = (recording.stop - recording.start) * 1e-9
     start = np.datetime_as_string(np.datetime64(recording.start, "ns"), unit="ms")
     console.print(f"[bold]{recording.name}[/bold]  {start}Z, {duration(seconds)}")

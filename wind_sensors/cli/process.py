@@ -26,7 +26,13 @@ from wind_sensors.estimation.constants import measures_vertical
 from wind_sensors.recordings import write_recording
 from wind_sensors.recordings.bag import TopicData
 from wind_sensors.recordings.other_topics import OtherTopics
-from wind_sensors.recordings.reading import bag_of, open_recording, signals_of, station_topics
+from wind_sensors.recordings.reading import (
+    bag_of,
+    name_of,
+    open_recording,
+    signals_of,
+    station_topics,
+)
 from wind_sensors.recordings.writing import clear_target, keep_inputs
 from wind_sensors.station.signals import Recording
 
@@ -125,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
 def _read(path: str, station_file: str | None) -> tuple[Recording, OtherTopics]:
     """The recording, and what else is in its bag."""
     content, station = open_recording(path, station_file)
-    recording = signals_of(content, station, Path(path).name or Path(path).resolve().name, path)
+    recording = signals_of(content, station, name_of(path), path)
     read = {topic for topic, data in content.topics.items() if data.raw}
     named = {
         topic: TopicData(data.message_type, count=data.count)

@@ -52,7 +52,8 @@ def read_recording(path: str | Path, station_file: str | Path | None = None) -> 
     """Read a recording.
 
     Args:
-        path: Folder with `recording.yaml` and `bag/`, or a bag (then `station_file` is needed).
+        path: Folder with `recording.yaml` and `bag/`, or a bag (then `station_file` is needed,
+            unless the bag is that of such a folder).
         station_file: Station file that replaces the recording's own.
 
     Returns:
@@ -63,8 +64,7 @@ def read_recording(path: str | Path, station_file: str | Path | None = None) -> 
             bag has none of the station's topics.
     """
     content, station = open_recording(path, station_file)
-    name = Path(path).name or Path(path).resolve().name
-    return signals_of(content, station, name, str(path))
+    return signals_of(content, station, name_of(path), str(path))
 
 
 def open_recording(
@@ -78,8 +78,14 @@ def open_recording(
     folder = Path(path)
     if not folder.exists():
         raise UserError("there is no such recording.", str(path), "Check the path.")
-    own_file = folder / STATION_FILE
     bag = bag_of(folder)
+    if bag.is_dir() and not any(bag.iterdir()):
+        raise UserError(
+            "this folder is empty.",
+            str(bag),
+            f"Give a folder with {STATION_FILE} and {BAG_FOLDER}/, or a ROS 2 bag.",
+        )
+    own_file = home_of(folder) / STATION_FILE
     if station_file is None and not own_file.exists():
         raise UserError(
             f"there is no {STATION_FILE} beside the bag.",
@@ -90,6 +96,20 @@ def open_recording(
     topics = station_topics(station)
     content = read_bag(bag, lambda topic: topic in topics or topic.endswith(TRUTH_TOPIC))
     return content, station
+
+
+def home_of(path: Path) -> Path:
+    """The recording folder that a path stands for: itself, or the one around its bag."""
+    path = path.absolute()
+    for bag in (path, path.parent):
+        if bag.name == BAG_FOLDER and (bag.parent / STATION_FILE).exists():
+            return bag.parent
+    return path
+
+
+def name_of(path: str | Path) -> str:
+    """The name of a recording."""
+    return home_of(Path(path)).name or Path(path).resolve().name
 
 
 def bag_of(folder: Path) -> Path:

@@ -161,7 +161,7 @@ class AirRange(NamedTuple):
 
 AIR_RANGES: dict[AirSignal, AirRange] = {
     "temperature": AirRange(-95.0, 65.0, "deg C", "for kelvin write `offset: -273.15`"),
-    "pressure": AirRange(10_000.0, 115_000.0, "Pa", "for hPa write `scale: 100`"),
+    "pressure": AirRange(10_000.0, 120_000.0, "Pa", "for hPa write `scale: 100`"),
 }
 """From the coldest to the hottest place on earth, and from 16 km up to below the sea's level."""
 
