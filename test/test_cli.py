@@ -219,6 +219,47 @@ def test_process_keeps_the_messages_of_a_signal_that_it_cannot_use(tmp_path: Pat
     assert messages_of(tmp_path / "wind" / "bag", topic) == messages_of(folder / "bag", topic)
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "limit"),
+    [
+        ("--duration", "1e9h", "at most 168h"),
+        ("--speed", "1e9", "at most 100 m/s"),
+        ("--speed", "0", "at least 0.01"),
+        ("--temperature", "-400", "least -90 and at most 60 deg C"),
+        ("--temperature", "1e5", "least -90 and at most 60 deg C"),
+        ("--temperature-amplitude", "nan", "40 K"),
+        ("--pressure", "1013", "least 10000 and at most 120000 Pa"),
+        ("--stability", "1e6", "least -5 and at most 2,"),
+        ("--integral-length", "inf", "10000 m"),
+        ("--slow-amplitude", "1e3", "50 m/s"),
+        ("--turn-amplitude", "1e3", "180 deg"),
+        ("--direction-from", "nan", "360 deg"),
+        ("--course", "inf", "360 deg"),
+        ("--platform-speed", "-1", "100 m/s"),
+        ("--rate", "1e6", "1000 per second"),
+    ],
+)
+def test_a_simulation_stays_on_earth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str, limit: str
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["simulate", "mast_cup_vane", "-o", str(tmp_path / "s"), f"{option}={value}"])
+    assert stopped.value.code == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"argument {option}: " in told and limit in told and f"not {value}" in told.replace(
+        "'", ""
+    )
+
+
+def test_a_simulation_fits_the_memory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = ["simulate", "mast_cup_vane", "-o", str(tmp_path / "s"), "--duration", "100h"]
+    assert main([*long, "--rate", "20"]) == 2
+    told = capsys.readouterr().err
+    assert "7.2e+06 samples" in told and "at most 55.6h at this rate" in told
+
+
 def test_info_shows_topics_rates_station_and_notes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

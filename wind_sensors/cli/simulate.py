@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +25,11 @@ from wind_sensors.station.signals import PlatformStates, Recording, Winds
 from wind_sensors.turbulence.synthesis import TurbulenceSpec, isotropic_spec, surface_layer_spec
 
 FASTEST_RATE = 1000.0
-"""Samples per second beyond which no wind sensor goes, and a quarter of an hour fills a memory."""
+"""Samples per second beyond which no wind sensor goes."""
+LONGEST = 7.0 * 86_400.0
+"""Longest simulation [s]."""
+MOST_SAMPLES = 4_000_000
+"""Of one simulation: a kilobyte each fills the memory of a usual machine."""
 
 _UNITS = {"ms": 1e-3, "min": 60.0, "h": 3600.0, "s": 1.0}
 
@@ -44,26 +49,31 @@ def seconds(text: str) -> float:
         ) from problem
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"a duration must be positive, not '{text}'")
+    if value > LONGEST:
+        raise argparse.ArgumentTypeError(f"must be at most {LONGEST / 3600.0:g}h, not '{text}'")
     return value
 
 
-def positive(text: str) -> float:
-    """A positive number."""
-    try:
-        value = float(text)
-    except ValueError as problem:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from problem
-    if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"must be positive, not '{text}'")
-    return value
+def between(least: float, most: float, unit: str = "") -> Callable[[str], float]:
+    """A type of argument: a number within limits.
 
+    Args:
+        least, most: Limits, both allowed.
+        unit: For the message.
+    """
 
-def sampling_rate(text: str) -> float:
-    """Samples per second, at most `FASTEST_RATE`."""
-    value = positive(text)
-    if value > FASTEST_RATE:
-        raise argparse.ArgumentTypeError(f"must be at most {FASTEST_RATE:g} per second, not {text}")
-    return value
+    def number(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError as problem:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a number") from problem
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(
+                f"must be at least {least:g} and at most {most:g}{unit and f' {unit}'}, not {text}"
+            )
+        return value
+
+    return number
 
 
 def share(text: str) -> float:
@@ -96,14 +106,16 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument("--seed", type=int, default=0, help="of everything random, from 0")
 
     wind = parser.add_argument_group("wind")
-    wind.add_argument("--speed", type=positive, default=8.0, help="mean wind speed [m/s]")
     wind.add_argument(
-        "--direction-from", type=float, default=270.0, metavar="DEG",
+        "--speed", type=between(0.01, 100.0, "m/s"), default=8.0, help="mean wind speed [m/s]"
+    )
+    wind.add_argument(
+        "--direction-from", type=between(-360.0, 360.0, "deg"), default=270.0, metavar="DEG",
         help="direction the wind comes from, clockwise from north",
     )  # fmt: skip
     wind.add_argument("--intensity", type=share, default=0.12, help="turbulence intensity sigma/U")
     wind.add_argument(
-        "--integral-length", type=positive, default=60.0, metavar="M",
+        "--integral-length", type=between(0.1, 10_000.0, "m"), default=60.0, metavar="M",
         help="longitudinal integral length [m]",
     )  # fmt: skip
     wind.add_argument(
@@ -112,15 +124,15 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--intensity and --integral-length",
     )  # fmt: skip
     wind.add_argument(
-        "--stability", type=float, default=0.0, metavar="Z/L",
+        "--stability", type=between(-5.0, 2.0), default=0.0, metavar="Z/L",
         help="height over the Monin-Obukhov length, with --surface-layer",
     )  # fmt: skip
     wind.add_argument(
-        "--slow-amplitude", type=float, default=0.0, metavar="M/S",
+        "--slow-amplitude", type=between(-50.0, 50.0, "m/s"), default=0.0, metavar="M/S",
         help="amplitude of a slow change of the mean speed",
     )  # fmt: skip
     wind.add_argument(
-        "--turn-amplitude", type=float, default=0.0, metavar="DEG",
+        "--turn-amplitude", type=between(-180.0, 180.0, "deg"), default=0.0, metavar="DEG",
         help="amplitude of a slow turn of the mean direction",
     )  # fmt: skip
     wind.add_argument(
@@ -132,10 +144,13 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
     carrier = parser.add_argument_group("carrier (a station with a platform)")
     carrier.add_argument("--carrier", choices=sorted(CARRIERS), help="how the platform moves")
-    carrier.add_argument("--platform-speed", type=float, metavar="M/S", help="over ground")
     carrier.add_argument(
-        "--course", type=float, metavar="DEG", default=90.0, help="clockwise from north"
+        "--platform-speed", type=between(0.0, 100.0, "m/s"), metavar="M/S", help="over ground"
     )
+    carrier.add_argument(
+        "--course", type=between(-360.0, 360.0, "deg"), metavar="DEG", default=90.0,
+        help="clockwise from north",
+    )  # fmt: skip
     carrier.add_argument(
         "--follow", metavar="RECORDING", help="move as the platform in this recording"
     )
@@ -144,14 +159,20 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
 
     air = parser.add_argument_group("air and rates")
-    air.add_argument("--temperature", type=float, default=15.0, help="[deg C]")
     air.add_argument(
-        "--temperature-amplitude", type=float, default=0.0, help="of a slow change [K]"
+        "--temperature", type=between(-90.0, 60.0, "deg C"), default=15.0, help="[deg C]"
     )
-    air.add_argument("--pressure", type=positive, default=101_325.0, help="[Pa]")
     air.add_argument(
-        "--rate", type=sampling_rate, default=20.0, help="of all sampled signals [1/s]"
+        "--temperature-amplitude", type=between(-40.0, 40.0, "K"), default=0.0,
+        help="of a slow change [K]",
+    )  # fmt: skip
+    air.add_argument(
+        "--pressure", type=between(10_000.0, 120_000.0, "Pa"), default=101_325.0, help="[Pa]"
     )
+    air.add_argument(
+        "--rate", type=between(0.01, FASTEST_RATE, "per second"), default=20.0,
+        help="of all sampled signals [1/s]",
+    )  # fmt: skip
 
     faults = parser.add_argument_group("faults of the transport")
     faults.add_argument("--loss", type=share, default=0.0, help="share of messages lost")
@@ -161,7 +182,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     faults.add_argument("--nan", type=share, default=0.0, help="share of angles that are NaN")
     faults.add_argument(
-        "--clock-jump", type=float, nargs=2, metavar=("AT", "BY"),
+        "--clock-jump", type=between(-LONGEST, LONGEST, "s"), nargs=2, metavar=("AT", "BY"),
         help="the stamping clock jumps by BY seconds AT seconds after the start",
     )  # fmt: skip
     parser.set_defaults(run=run)
@@ -195,6 +216,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _scenario(args: argparse.Namespace, station: Station) -> Scenario:
     wind, duration = _wind(args, station)
+    samples = duration * args.rate
+    if samples > MOST_SAMPLES:
+        raise UserError(
+            f"these are {samples:.3g} samples of each signal, more than the memory holds.",
+            "--duration, --rate",
+            f"Simulate at most {MOST_SAMPLES / args.rate / 3600.0:.3g}h at this rate.",
+        )
     jump_at, jump_by = args.clock_jump if args.clock_jump else (None, 0.0)
     return Scenario(
         wind=wind,
