@@ -14,6 +14,7 @@ from rosbags.rosbag2 import Reader, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from wind_sensors.cli import main as front
+from wind_sensors.cli import monte_carlo
 from wind_sensors.cli.main import main
 from wind_sensors.recordings import write_recording
 from wind_sensors.recordings.writing import keep_inputs
@@ -258,6 +259,56 @@ def test_a_simulation_fits_the_memory(
     assert main([*long, "--rate", "20"]) == 2
     told = capsys.readouterr().err
     assert "7.2e+06 samples" in told and "at most 55.6h at this rate" in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("monte-carlo", "--pairs", "0"), "--pairs: 0 is too few. Give at least 2;"),
+        (("monte-carlo", "--seed", "-1"), "--seed: The seed must not be negative. Use"),
+        (("figures", "k94-99", "-o", "{tmp}"), "there is no figure 'k94-99'. Known: "),
+        (("figures", "k94-2", "-o", "{tmp}/file"), "file: this is a file, not a folder. Choose"),
+        (("figures", "k94-2", "-o", "{tmp}/file/x"), "x: this cannot be written (Not a dir"),
+        (("plot", "{r}", "-o", "{tmp}/file/x"), "x: this cannot be written (Not a dir"),
+        (
+            ("process", "{r}", "-o", "{tmp}/new", "--output-rate", "0"),
+            "--output-rate: 0 is out of range. Give a value from 0.1 to 200.",
+        ),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_refusals_are_whole_sentences_about_what_was_typed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], told: str
+) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording(seconds=5.0))
+    (tmp_path / "file").write_text("no folder")
+    assert main([text.format(r=folder, tmp=tmp_path) for text in arguments]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_a_table_that_cannot_be_written_is_no_traceback(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(monte_carlo, "run_monte_carlo", lambda *_, **__: [])
+    (tmp_path / "file").write_text("no folder")
+    assert main(["monte-carlo", "-o", str(tmp_path / "file" / "table.md")]) == 2
+    assert "table.md: this cannot be written (" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("--rate", "0", "--rate: this must be at least 0.01, not 0. It means: Simulated"),
+        ("--mean-speed", "1e9", "--mean-speed: this must be at most 100, not 1e+09."),
+        ("--method", "magic", "--method: this is one of "),
+    ],
+)
+def test_compose_names_the_option(
+    capsys: pytest.CaptureFixture[str], option: str, value: str, told: str
+) -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    assert main(["compose", "mast_cup_vane", option, value]) == 2
+    assert told in capsys.readouterr().err
 
 
 def test_info_shows_topics_rates_station_and_notes(

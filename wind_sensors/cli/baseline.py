@@ -13,7 +13,7 @@ from rich.progress import Progress
 from wind_sensors.diagnosis.comparing.reference_place import Place
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
-from wind_sensors.errors import UserError
+from wind_sensors.errors import UserError, writing
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.station.model import Station
 
@@ -96,8 +96,9 @@ def run(options: argparse.Namespace) -> int:
         )
     with Progress(console=Console(stderr=True), transient=True) as progress:
         baseline = learnt(options.recordings, options.station, None, progress)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    options.output.write_text(baseline.to_json() + "\n", encoding="utf-8")
+    with writing(options.output):
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(baseline.to_json() + "\n", encoding="utf-8")
     print(f"wrote {options.output} from {len(baseline.recordings)} healthy recordings")
     if baseline.place is not None:
         print(told_place(baseline.place))

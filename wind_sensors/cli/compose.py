@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.nodes import execution
     from wind_sensors.recordings.writing import keep_inputs
 
+    _check(args)
     if args.output:
         keep_inputs(args.output, (args.station,))
     simulation: dict[str, object] = {
@@ -97,3 +98,35 @@ def run(args: argparse.Namespace) -> int:
     if made and made[0].recorder is not None:
         show(made[0].recorder, args.output, console)
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Judge the options by the limits of the parameters behind them, under their own names.
+
+    Raises:
+        UserError: A value is not acceptable.
+    """
+    from wind_sensors.errors import UserError
+    from wind_sensors.nodes import estimator_parameters, simulator
+
+    simulation = {p.name: p for p in simulator.NODE_PARAMETERS}
+    estimation = {p.name: p for p in estimator_parameters.NODE_PARAMETERS}
+    for option, value, parameter in (
+        ("--duration", args.duration, simulation["duration"]),
+        ("--rate", args.rate, simulation["speed"]),
+        ("--seed", args.seed, simulation["seed"]),
+        ("--mean-speed", args.mean_speed, simulation["mean_speed"]),
+        ("--intensity", args.intensity, simulation["intensity"]),
+        ("--method", args.method, estimation["method"]),
+        ("--window", args.window, estimation["window"]),
+    ):
+        if value is None:
+            continue
+        try:
+            parameter.accept(value)
+        except ValueError as problem:
+            raise UserError(
+                f"{problem}.".replace(f"'{parameter.name}'", "this"),
+                option,
+                f"It means: {parameter.description}",
+            ) from None

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import track
 
-from wind_sensors.errors import UserError
+from wind_sensors.errors import UserError, writing
 from wind_sensors.report.paper_figures import FIGURES, render
 
 
@@ -38,19 +38,24 @@ def run(args: argparse.Namespace) -> int:
     unknown = [name for name in names if name not in FIGURES]
     if unknown:
         raise UserError(
-            f"there is no figure '{unknown[0]}'", remedy=f"Known: {', '.join(FIGURES)}."
+            f"there is no figure '{unknown[0]}'.", remedy=f"Known: {', '.join(FIGURES)}."
         )
     folder = Path(args.output)
     if folder.exists() and not folder.is_dir():
-        raise UserError("this is a file, not a folder", str(folder))
+        raise UserError(
+            "this is a file, not a folder.", str(folder), "Choose another place with -o."
+        )
     targets = {name: folder / f"{name}.{args.format}" for name in names}
     present = [path for path in targets.values() if path.exists()]
     if present and not args.force:
-        raise UserError("the file is already there", str(present[0]), "Use --force to replace it.")
-    folder.mkdir(parents=True, exist_ok=True)
+        raise UserError(
+            "the file is already there.", str(present[0]), "Use --force to replace it."
+        )
     console = Console()
-    for name in track(names, description="drawing", console=console, transient=True):
-        render(name, targets[name])
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in track(names, description="drawing", console=console, transient=True):
+            render(name, targets[name])
     for path in targets.values():
         console.print(f"wrote {path}")
     return 0

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from wind_sensors.errors import UserError
+from wind_sensors.errors import UserError, writing
 from wind_sensors.report.monte_carlo import Row, run_monte_carlo, table_markdown
 from wind_sensors.report.monte_carlo_cases import standard_cases
 
@@ -35,14 +35,15 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace) -> int:
     """Run the experiment, print its table, write it where asked."""
-    if args.pairs < 2 or args.seed < 0:
+    if args.pairs < 2:
         raise UserError(
-            "--pairs must be at least 2 and --seed not negative",
-            remedy="200 pairs take a minute or two.",
+            f"{args.pairs} is too few.", "--pairs", "Give at least 2; 200 take a minute or two."
         )
+    if args.seed < 0:
+        raise UserError("The seed must not be negative.", "--seed", "Use 0 or more.")
     target = Path(args.output) if args.output else None
     if target is not None and target.exists() and not args.force:
-        raise UserError("the file is already there", str(target), "Use --force to replace it.")
+        raise UserError("the file is already there.", str(target), "Use --force to replace it.")
     console = Console()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
@@ -58,8 +59,9 @@ def run(args: argparse.Namespace) -> int:
     # One row, one line, also where the output is not a terminal.
     Console(width=max(console.width, 130)).print(_table(rows))
     if target is not None:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(table_markdown(rows), encoding="utf-8")
+        with writing(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(table_markdown(rows), encoding="utf-8")
         console.print(f"wrote {target}")
     return 0 if all(row.passed for row in rows) else 1
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from wind_sensors.errors import UserError
+from wind_sensors.errors import UserError, writing
 from wind_sensors.recordings.reading import read_estimates, read_recording
 from wind_sensors.report import style
 from wind_sensors.report.plots import FIGURES, Estimates, draw
@@ -43,7 +43,8 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.output.exists() and not options.output.is_dir():
         raise UserError("this is no folder.", str(options.output), "Choose another place with -o.")
-    options.output.mkdir(parents=True, exist_ok=True)
+    with writing(options.output):
+        options.output.mkdir(parents=True, exist_ok=True)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("drawing", total=len(chosen) + 1)
         recording = read_recording(options.recording, options.station)

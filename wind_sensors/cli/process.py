@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from wind_sensors.errors import UserError
 from wind_sensors.estimation import (
     METHODS,
     EstimatorSettings,
@@ -92,14 +93,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    settings = EstimatorSettings(
-        method=args.method,
-        window=args.window,
-        output_rate=args.output_rate,
-        smoother_lag=args.smoother_lag,
-        bandwidth=args.bandwidth,
-        adaptation_time=args.adaptation_time,
-    )
+    settings = _settings(args)
     keep_inputs(args.output, (args.recording, args.station))
     if Path(args.output).exists() and not args.force:
         clear_target(Path(args.output), force=False)
@@ -126,6 +120,21 @@ def run(args: argparse.Namespace) -> int:
     _report(out, result, others.notes)
     print(f"wrote {folder}")
     return 0
+
+
+def _settings(args: argparse.Namespace) -> EstimatorSettings:
+    try:
+        return EstimatorSettings(
+            method=args.method,
+            window=args.window,
+            output_rate=args.output_rate,
+            smoother_lag=args.smoother_lag,
+            bandwidth=args.bandwidth,
+            adaptation_time=args.adaptation_time,
+        )
+    except UserError as problem:
+        option = f"--{problem.where.replace('_', '-')}"
+        raise UserError(problem.what, option, problem.remedy) from None
 
 
 def _read(path: str, station_file: str | None) -> tuple[Recording, OtherTopics]:

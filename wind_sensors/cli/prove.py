@@ -233,7 +233,7 @@ def _real(arguments: argparse.Namespace) -> int:
     output: Path = arguments.output
     if output.exists():
         if not arguments.force:
-            raise UserError("the folder exists already", str(output), "Add --force to replace it.")
+            raise UserError("the folder exists already.", str(output), "Add --force to replace it.")
         shutil.rmtree(output)
     print(f"wrote {run_real(output, arguments.local)}")
     return 0

@@ -72,5 +72,5 @@ class EstimatorSettings:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise UserError(
-                    f"{name} is {value:g}.", name, f"Give a value from {low:g} to {high:g}."
+                    f"{value:g} is out of range.", name, f"Give a value from {low:g} to {high:g}."
                 )

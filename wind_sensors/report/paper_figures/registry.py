@@ -66,9 +66,9 @@ def render(name: str, path: Path) -> None:
         UserError: If there is no such figure, or the format is unknown.
     """
     if name not in FIGURES:
-        raise UserError(f"there is no figure '{name}'", remedy=f"Known: {', '.join(FIGURES)}.")
+        raise UserError(f"there is no figure '{name}'.", remedy=f"Known: {', '.join(FIGURES)}.")
     if path.suffix not in {".png", ".svg", ".pdf"}:
-        raise UserError(f"figures cannot be written as '{path.suffix}'", str(path), "Use .png.")
+        raise UserError(f"figures cannot be written as '{path.suffix}'.", str(path), "Use .png.")
     entry = FIGURES[name]
     paper, number = name.split("-")
     figure = Figure(figsize=(7.2, 4.8), dpi=130, layout="constrained")
