@@ -17,6 +17,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from wind_sensors.errors import UserError
 from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.reading import order_notes
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.writing import write_topics
 from wind_sensors.station.inputs import TurnCounter
@@ -335,6 +336,65 @@ def test_what_is_odd_in_the_signals_is_noted_and_not_fatal(tmp_path: Path) -> No
 @pytest.fixture
 def small(tmp_path: Path) -> Path:
     return write_recording(tmp_path / "small", full_recording(np.random.default_rng(2)))
+
+
+def set_back_at(times: np.ndarray, index: int, by: int) -> np.ndarray:
+    """Times of a clock that is set back before the index-th message."""
+    return times - by * (np.arange(len(times)) >= index)
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+@pytest.mark.parametrize("by", [30_000_000_000, 12_345_678_901], ids=["on the grid", "off it"])
+def test_a_clock_that_is_set_back_mixes_nothing(
+    tmp_path: Path, plugin: StoragePlugin, by: int
+) -> None:
+    station = Station(instruments=(vane(Input(topic="/v")),))
+    true = START + np.arange(2400, dtype=np.int64) * 50_000_000
+    time = set_back_at(true, 1200, by)
+    angle = np.linspace(0.0, 1.0, len(time))
+    kind = "sensor_msgs/msg/JointState"
+    blank = template(TYPES, kind, [("position", 0)])
+    raw = serialised(TYPES, blank, {("header", "stamp"): time, ("position", 0): angle})
+    folder = tmp_path / "r"
+    folder.mkdir()
+    (folder / "recording.yaml").write_text(station_to_yaml(station))
+    with Writer(folder / "bag", version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/v", kind, typestore=TYPES)
+        for when, message in zip(time.tolist(), raw, strict=True):
+            writer.write(connection, when, message)
+    after = read_recording(folder)
+    assert np.array_equal(after.angles["vane"].time, time)
+    assert np.array_equal(after.angles["vane"].angle, angle)
+    went = f"clock went back by {by * 1e-9 - 0.05:.1f} s at "
+    assert [went in note for note in after.notes] == [True, True], after.notes
+    assert "recorder" in after.notes[0] and after.notes[1].startswith("/v: ")
+
+
+def test_topics_that_were_written_one_after_the_other_are_no_clock_set_back(small: Path) -> None:
+    before = read_recording(small)
+    with Reader(small / "bag") as reader:
+        messages = [(c.topic, c.msgtype, time, raw) for c, time, raw in reader.messages()]
+    shutil.rmtree(small / "bag")
+    with Writer(small / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        made = {}
+        for topic, kind, time, raw in sorted(messages, key=lambda message: message[0]):
+            if topic not in made:
+                made[topic] = writer.add_connection(topic, kind, typestore=TYPES)
+            writer.write(made[topic], time, raw)
+    after = read_recording(small)
+    assert after.notes == before.notes
+    assert np.array_equal(after.pulses["cup"].time, before.pulses["cup"].time)
+
+
+def test_one_stray_stamp_is_no_clock_set_back() -> None:
+    time = START + np.arange(10, dtype=np.int64) * 1_000_000_000
+    stray = time.copy()
+    stray[4] += 3 * 10**17
+    assert order_notes("/v", stray) == [
+        "/v: 1 stamps earlier than the one before (the first at 5.000 s)"
+    ]
+    back = set_back_at(time, 5, 300 * 10**9)
+    assert order_notes("/v", back) == ["/v: the clock went back by 299.0 s at 4.000 s"]
 
 
 def as_sqlite(folder: Path) -> None:

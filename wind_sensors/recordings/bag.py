@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from wind_sensors.errors import UserError
+from wind_sensors.recordings.file_order import set_back, written_times
 from wind_sensors.recordings.salvage import salvage
 
 _SUFFIXES = (".mcap", ".db3")
@@ -20,7 +22,8 @@ _SUFFIXES = (".mcap", ".db3")
 
 @dataclass
 class TopicData:
-    """Serialised messages of one topic in the order of the bag.
+    """Serialised messages of one topic: by time of recording, or where the recorder's clock was set
+    back, in the order of the file.
 
     Attributes:
         message_type: E.g. `std_msgs/msg/Header`.
@@ -106,7 +109,39 @@ def _read(path: Path, wanted: Callable[[str], bool]) -> BagContent:
             add_time, add_raw = appenders[connection.id]
             add_time(time)
             add_raw(raw)
+    _restore_order(path, content)
     return content
+
+
+def _restore_order(path: Path, content: BagContent) -> None:
+    """Put messages in the order of the file where the recorder's clock was set back."""
+    try:
+        written = written_times(path)
+    except Exception:
+        # The bag could be read; its order alone is not worth giving it up.
+        return
+    told: tuple[int, str] = (0, "")
+    for name, data in content.topics.items():
+        time = written.get(name)
+        if time is None or len(time) != len(data.raw):
+            continue
+        back = set_back(time)
+        if not back.size:
+            continue
+        place = np.argsort(time, kind="stable")
+        raw = dict(zip(place.tolist(), data.raw, strict=True))
+        data.raw = [raw[index] for index in range(len(time))]
+        data.log_time = time.tolist()
+        first = int(back[0])
+        by, at = int(time[first - 1] - time[first]), int(time[first - 1] - time[0])
+        times = "" if back.size == 1 else f", {back.size} times in all"
+        note = (
+            f"the recorder's clock went back by {by * 1e-9:.1f} s at {at * 1e-9:.1f} s{times}: the "
+            "messages stand in the order of the file"
+        )
+        told = max(told, (len(time), note))
+    if told[1]:
+        content.notes.append(told[1])
 
 
 def _salvaged(path: Path, wanted: Callable[[str], bool], problem: Exception) -> BagContent:

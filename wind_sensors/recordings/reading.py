@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
 from wind_sensors.recordings.fields import batches, columns, leaf, stamps
+from wind_sensors.recordings.file_order import SET_BACK
 from wind_sensors.recordings.platform import platform_states
 from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
 from wind_sensors.recordings.station_files import load_station
@@ -388,10 +389,21 @@ class _SignalReader:
 
 
 def order_notes(topic: str, time: TimeArray) -> list[str]:
-    """What is unusual in the order of stamps: repeated ones and ones that run back."""
+    """What is unusual in the order of stamps: repeated ones, and ones or a clock that go back."""
     step = np.diff(time)
     found = []
-    for bad, what in ((step == 0, "repeated"), (step < 0, "earlier than the one before")):
+    strayed = np.concatenate(([False], step[:-1] > -step[1:] // 2)) if step.size else step < 0
+    back = (step < -SET_BACK) & ~strayed
+    if back.any():
+        first = int(np.flatnonzero(back)[0])
+        at = (int(time[first]) - int(time[0])) * 1e-9
+        times = int(np.count_nonzero(back))
+        found.append(
+            f"{topic}: the clock went back by {-step[first] * 1e-9:.1f} s at {at:.3f} s"
+            f"{'' if times == 1 else f', {times} times in all'}"
+        )
+    late = (step < 0) & ~back
+    for bad, what in ((step == 0, "repeated"), (late, "earlier than the one before")):
         count = int(np.count_nonzero(bad))
         if count:
             at = (int(time[1:][bad][0]) - int(time[0])) * 1e-9
