@@ -11,13 +11,14 @@ from rich.progress import Progress
 from rich.table import Table
 
 from wind_sensors.cli.baseline import learnt, read_baseline
+from wind_sensors.cli.diagnose import print_notes
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.regions import region_bank, strongest
 from wind_sensors.errors import UserError, writing
 from wind_sensors.recordings.reading import read_recording
-from wind_sensors.report.comparison_files import NAMES, write
+from wind_sensors.report.comparison_files import NAMES, NO_READINGS, unread, write
 from wind_sensors.report.diagnosis_files import make_way
 
 
@@ -84,7 +85,10 @@ def run(options: argparse.Namespace) -> int:
             f"{np.mean(residual):+.3f} {unit}",
             f"{np.sqrt(np.mean(residual**2)):.3f} {unit}",
         )
+    for name in unread(comparison):
+        table.add_row(name, NO_READINGS, NO_READINGS)
     console.print(table)
+    print_notes(console, recording.notes)
     top = found[0]
     console.print(
         f"stands out most: {top.region.channel}, {top.region.label} "

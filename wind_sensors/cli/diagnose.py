@@ -100,11 +100,20 @@ def catalogue_without(names: Sequence[str]) -> dict[str, Effect]:
     return {name: effect for name, effect in known.items() if name not in names}
 
 
+def print_notes(console: Console, notes: Sequence[str]) -> None:
+    """What reading a recording had to say."""
+    for note in notes:
+        console.print(f"note: {note}", markup=False, highlight=False)
+
+
 def _print(console: Console, diagnosis: Diagnosis) -> None:
     names = names_of(diagnosis.findings)
     console.print(
         f"[bold]{diagnosis.recording}[/bold]: {diagnosis.verdict}" + (f": {names}" if names else "")
     )
+    for silent in diagnosis.silent:
+        console.print(f"[bold red]silent[/bold red] {silent.words}", highlight=False)
+    print_notes(console, diagnosis.comparison.recording.notes)
     if diagnosis.findings:
         table = Table(box=None)
         for column in ("effect", "instrument", "when", "size", "95 % interval", "held out"):
@@ -124,7 +133,7 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
                 )
         console.print(table)
         console.print("held out: share of the excess misfit removed on data that were not fitted")
-    if diagnosis.unexplained.description:
-        console.print(f"left over: {diagnosis.unexplained.description}")
+    if diagnosis.left_over:
+        console.print(f"left over: {diagnosis.left_over}")
     if not diagnosis.calibrated:
         console.print("null not calibrated: give --healthy recordings of the same station")

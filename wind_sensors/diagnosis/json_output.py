@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from wind_sensors.diagnosis.explaining.fitting import ALWAYS
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.verdict import Diagnosis
+from wind_sensors.station.silence import Silent
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -20,6 +22,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "null_calibrated": diagnosis.calibrated,
         "findings": [finding_json(f, length) for f in diagnosis.findings],
+        "silent": silent_json(diagnosis.silent),
+        "notes": list(diagnosis.comparison.recording.notes),
         "unexplained": {
             "p": round(diagnosis.unexplained.p, 4),
             "share": round(diagnosis.unexplained.share, 4),
@@ -37,6 +41,11 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
             for key, (value, unit) in diagnosis.smallest_detectable.items()
         },
     }  # fmt: skip
+
+
+def silent_json(silent: Sequence[Silent]) -> list[dict[str, str]]:
+    """Instruments that say nothing in the whole recording."""
+    return [{"instrument": s.instrument, "topic": s.topic, "words": s.words} for s in silent]
 
 
 def _rounded(value: float) -> float | None:

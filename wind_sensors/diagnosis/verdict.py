@@ -26,6 +26,7 @@ from wind_sensors.diagnosis.proving.judging import judgement_of
 from wind_sensors.diagnosis.regions import Found, RegionBank
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
+from wind_sensors.station.silence import Silent, silent_instruments
 
 TURNING_MISFIT = 0.1
 """The search runs again without the seconds in which vanes turn round apart if these hold this
@@ -51,6 +52,7 @@ class Diagnosis:
         baseline: What was normal.
         comparison, naming, simulated, corrected: For reports.
         objection: Why what fits best is not named; empty: no name was withdrawn.
+        silent: Instruments of the station that say nothing in the whole recording.
     """
 
     recording: str
@@ -68,6 +70,13 @@ class Diagnosis:
     regions_before: tuple[Found, ...] = ()
     objection: str = ""
     bank: RegionBank | None = field(default=None, repr=False)
+    silent: tuple[Silent, ...] = ()
+
+    @property
+    def left_over(self) -> str:
+        """What is left, and why no name is given, without what is said of silent instruments."""
+        silent = "; ".join(each.words for each in self.silent)
+        return self.unexplained.description.removeprefix(silent).removeprefix("; ")
 
 
 def _explained(
@@ -191,13 +200,16 @@ def diagnose(
     # What commissioning found makes up for the reference as much as for the instrument.
     station = planted(baseline.original, named)
     remainder = judged.remainder
+    silent = silent_instruments(recording, baseline.station)
+    told = (*(each.words for each in silent), judged.words(baseline))
     return Diagnosis(
         recording=recording.name,
-        verdict=judged.verdict,
+        # Nobody knows that all is well with what says nothing.
+        verdict="unknown" if silent and judged.verdict == "none" else judged.verdict,
         calibrated=baseline.calibrated,
         findings=judged.findings,
         unexplained=Unexplained(
-            remainder.p, remainder.share, judged.regions, judged.words(baseline)
+            remainder.p, remainder.share, judged.regions, "; ".join(part for part in told if part)
         ),
         smallest_detectable={k: (v, unit) for k, (v, unit, _) in judged.detectable.items()},
         station=station,
@@ -209,4 +221,5 @@ def diagnose(
         regions_before=judged.regions_before,
         objection=judged.objection,
         bank=judged.bank,
+        silent=silent,
     )

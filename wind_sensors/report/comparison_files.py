@@ -12,7 +12,9 @@ import numpy as np
 
 from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observation import channels_of
 from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.json_output import silent_json
 from wind_sensors.diagnosis.regions import Found
 from wind_sensors.recordings.serialising import TopicMessages
 from wind_sensors.recordings.station_files import shipped_profiles
@@ -21,9 +23,19 @@ from wind_sensors.report.cuts import in_both_cuts
 from wind_sensors.report.diagnosis_figures import channel_words, residual_figure
 from wind_sensors.report.diagnosis_files import series_topics
 from wind_sensors.report.diagnosis_page import document
+from wind_sensors.station.silence import silent_instruments
 from wind_sensors.station.writing import station_to_yaml
 
 NAMES = ("comparison.json", "comparison.html", "residuals")
+
+NO_READINGS = "no readings"
+"""What stands in the place of the residual of an instrument that says nothing."""
+
+
+def unread(comparison: Comparison) -> list[str]:
+    """Channels of the station of which the recording has no readings."""
+    seen = {channel.name for channel in comparison.channels}
+    return [c.name for c in channels_of(comparison.station) if c.name not in seen]
 
 
 def channel_summary(comparison: Comparison, simulated: Simulated) -> list[dict[str, Any]]:
@@ -80,7 +92,9 @@ def write(
         }
         for f in found
     ]  # fmt: skip
+    silent = silent_instruments(comparison.recording, comparison.station)
     content = {"recording": comparison.recording.name, "channels": summary,
+               "silent": silent_json(silent), "notes": list(comparison.recording.notes),
                "regions": regions, "p": p}  # fmt: skip
     (folder / "comparison.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     rows = "".join(
@@ -93,6 +107,11 @@ def write(
         f"<td class='n'>{c['rms']:.3g} {c['unit']}</td></tr>"
         for c in summary
     )
+    means += "".join(
+        f"<tr><td>{escape(name)}</td><td class='n'>{NO_READINGS}</td>"
+        f"<td class='n'>{NO_READINGS}</td></tr>"
+        for name in unread(comparison)
+    )
     figures = "".join(
         in_both_cuts(
             partial(residual_figure, comparison, simulated, None, channel),
@@ -100,10 +119,11 @@ def write(
         )
         for channel in comparison.channels
     )
+    told = "".join(f"<p><b>{escape(s.words)}.</b></p>" for s in silent)
     body = (
         f"<header><div class='muted'>{escape(comparison.recording.name)} · wind compare</div>"
         "<h1>Recorded minus simulated</h1><div class='scroll'><table><tr><th>channel</th>"
-        f"<th>mean</th><th>rms</th></tr>{means}</table></div></header>"
+        f"<th>mean</th><th>rms</th></tr>{means}</table></div>{told}</header>"
         f"<section>{figures}</section><section><h2>Where it stands out</h2>"
         f"<p>p = {p:.3g} for the largest, after looking everywhere.</p><div class='scroll'>"
         "<table><tr><th>channel</th><th>where</th><th>residual</th><th>score</th></tr>"

@@ -61,6 +61,9 @@ VERDICTS = {
 
 def _headline(diagnosis: Diagnosis) -> str:
     headline = names_of(diagnosis.findings) or VERDICTS[diagnosis.verdict]
+    if diagnosis.silent and not diagnosis.findings:
+        names = " and ".join(s.instrument for s in diagnosis.silent)
+        headline = f"{names} {'says' if len(diagnosis.silent) == 1 else 'say'} nothing at all"
     return headline[0].upper() + headline[1:]
 
 
@@ -72,9 +75,17 @@ def when_text(term: Term) -> str:
     return "" if "start" in term.values else "all the time"
 
 
+def _left_over(diagnosis: Diagnosis) -> list[str]:
+    """Why no name is given."""
+    if diagnosis.verdict not in {"unknown", "inconclusive"} or not diagnosis.left_over:
+        return []
+    return [diagnosis.left_over]
+
+
 def _summary(diagnosis: Diagnosis) -> str:
     verdict = VERDICTS[diagnosis.verdict]
     lines = [f"<p class='muted'>{escape(verdict)}.</p>"] if diagnosis.findings else []
+    lines += [f"<p><b>Silent:</b> {escape(silent.words)}.</p>" for silent in diagnosis.silent]
     for finding in diagnosis.findings:
         term = finding.term
         text = "; ".join(size.text for size in sizes_of(finding, diagnosis.station))
@@ -84,8 +95,8 @@ def _summary(diagnosis: Diagnosis) -> str:
             f"<p><b>{escape(words(term.effect.name))}</b>, {escape(term.instrument)}: "
             f"{escape(term.effect.meaning)}<br>{escape(text)}.</p>"
         )
+    lines += [f"<p>{escape(part)}.</p>" for part in _left_over(diagnosis)]
     if diagnosis.verdict == "unknown":
-        lines.append(f"<p>{escape(diagnosis.unexplained.description)}.</p>")
         nearest = " and ".join(
             f"{words(t.effect.name)} ({t.instrument})" for t in diagnosis.naming.fit.terms
         )
@@ -186,7 +197,7 @@ def _next(diagnosis: Diagnosis) -> str:
             lines.append(
                 f"<li>against {escape(words(name))}{mark}: {escape(measurement)}</li>"
             )
-    if diagnosis.verdict == "unknown":
+    if diagnosis.verdict == "unknown" and not diagnosis.silent:
         lines.append(
             "<li>record again when wind speed and direction differ, to see what it follows</li>"
         )

@@ -28,6 +28,7 @@ from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording
+from wind_sensors.station.silence import tells
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -84,7 +85,12 @@ def prepare(
     channels = tuple(
         c
         for c in channels_of(known)
-        if c.instrument in (recording.pulses if c.kind == "rotor_rate" else recording.angles)
+        if (
+            c.instrument in recording.pulses
+            if c.kind == "rotor_rate"
+            # What says nothing would be taken to do what is expected of it.
+            else tells(recording.angles.get(c.instrument))
+        )
     )
     if not channels:
         raise UserError(

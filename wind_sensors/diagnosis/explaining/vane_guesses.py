@@ -208,7 +208,7 @@ def _gap(
 def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     """A gap where readings jump about, in the sector in which they do."""
     wrong = erratic(comparison.recording.angles[channel.instrument])
-    if np.mean(wrong) < LEAST_ERRATIC:
+    if not wrong.any() or np.mean(wrong) < LEAST_ERRATIC:
         return []
     centre, width = _sector(comparison, channel, wrong)
     sectors = [(centre, share * width) for share in NARROWER]

@@ -38,8 +38,10 @@ from wind_sensors.diagnosis.healthy.whitening import (
     trust_of,
     unstanding,
 )
+from wind_sensors.errors import UserError
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
+from wind_sensors.station.silence import silent_instruments
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -284,6 +286,22 @@ def _commissioned(
     return current
 
 
+def _refuse_silence(recording: Recording) -> None:
+    """A recording in which an instrument says nothing is not healthy.
+
+    Raises:
+        UserError: There is such an instrument.
+    """
+    silent = silent_instruments(recording, recording.station)
+    if silent:
+        what = " and ".join(f"'{s.instrument}' has no {s.signal} on {s.topic}" for s in silent)
+        raise UserError(
+            f"{what}: a recording in which an instrument says nothing is not healthy.",
+            recording.name,
+            "Look at its cable, its driver and the topic; leave this recording out.",
+        )
+
+
 def learn(
     recordings: Sequence[Recording],
     station: Station | None = None,
@@ -297,7 +315,12 @@ def learn(
         station: The station; None: that of the first recording.
         workers: Processes.
         progress: Called with the share done.
+
+    Raises:
+        UserError: A recording cannot be compared, or an instrument says nothing in one.
     """
+    for recording in recordings:
+        _refuse_silence(recording)
     if station is None:
         station = recordings[0].station
     baseline = default_baseline(station)

@@ -1,0 +1,63 @@
+"""Instruments of a station that say nothing in a whole recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wind_sensors.station.inputs import angle_inputs
+from wind_sensors.station.model import Angle, Rotor, Station
+from wind_sensors.station.signals import Angles, Recording
+
+FEWEST_READINGS = 16
+"""With fewer readings in a whole recording a vane says nothing: no spectrum can be taken."""
+
+
+@dataclass(frozen=True)
+class Silent:
+    """An instrument without anything usable in a recording.
+
+    Attributes:
+        instrument: Its name.
+        topic: On which its signal should have come.
+        signal: What is missing: `pulses` or `readings`.
+    """
+
+    instrument: str
+    topic: str
+    signal: str
+
+    @property
+    def words(self) -> str:
+        """For people, with what to do."""
+        return (
+            f"{self.instrument}: no {self.signal} at all on {self.topic}, so nothing can be said "
+            "of it: look at its cable, its driver, the topic"
+        )
+
+
+def tells(readings: Angles | None) -> bool:
+    """Whether a vane has readings enough that are numbers."""
+    if readings is None:
+        return False
+    return int(np.count_nonzero(np.isfinite(readings.angle))) >= FEWEST_READINGS
+
+
+def silent_instruments(recording: Recording, station: Station) -> tuple[Silent, ...]:
+    """Instruments of a station that say nothing in a recording, in the station's order.
+
+    Args:
+        recording: The signals.
+        station: Whose instruments should have spoken.
+    """
+    found = []
+    for entry in station.instruments:
+        if isinstance(entry, Rotor):
+            pulses = recording.pulses.get(entry.name)
+            if pulses is None or pulses.time.size == 0:
+                found.append(Silent(entry.name, entry.pulses.topic, "pulses"))
+        elif isinstance(entry, Angle) and not tells(recording.angles.get(entry.name)):
+            topic = angle_inputs(entry)[entry.name].topic
+            found.append(Silent(entry.name, topic, "readings"))
+    return tuple(found)
