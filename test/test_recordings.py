@@ -17,6 +17,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from wind_sensors.errors import UserError
 from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.plausible import strays
 from wind_sensors.recordings.reading import order_notes
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.writing import write_topics
@@ -331,6 +332,76 @@ def test_what_is_odd_in_the_signals_is_noted_and_not_fatal(tmp_path: Path) -> No
     assert "/v: 2 of 7 values are not numbers and were left out (the first at 2.000 s)" in notes
     assert "/c: 1 stamps repeated (the first at 2.000 s)" in notes
     assert "/c: 1 stamps earlier than the one before (the first at 1.000 s)" in notes
+
+
+DAY = 86_400_000_000_000
+
+
+def spread(stray: dict[int, int]) -> np.ndarray:
+    """Stamps of 200 s, some of them moved by so many nanoseconds."""
+    time = START + np.arange(2000, dtype=np.int64) * 100_000_000
+    for index, by in stray.items():
+        time[index] += by
+    return time
+
+
+@pytest.mark.parametrize(
+    "stray",
+    [{700: 3000 * DAY}, {0: -3000 * DAY}, {0: -20_000 * DAY, 1999: DAY}, {3: DAY, 9: 900 * DAY}],
+)
+def test_single_stamps_far_from_all_others_are_left_out_and_noted(
+    tmp_path: Path, stray: dict[int, int]
+) -> None:
+    time = spread(stray)
+    near = np.delete(time, list(stray))
+    before = recorded(
+        Station(
+            instruments=(cup(Input(topic="/c")), vane(Input(topic="/v"))),
+            reference=Reference(topic=Input(topic="/w")),
+            air=Air(temperature=Input(topic="/t")),
+            platform=Platform(odometry=Input(topic="/odom")),
+        ),
+        pulses={"cup": Pulses(time)},
+        angles={"vane": Angles(time, np.zeros(time.size))},
+        reference=Winds(time, np.ones((time.size, 3))),
+        temperature=Series(time, np.full(time.size, 15.0)),
+        platform=PlatformStates(
+            time, np.tile([0.0, 0.0, 0.0, 1.0], (time.size, 1)),
+            *(np.zeros((time.size, 3)) for _ in range(3)),
+        ),
+    )  # fmt: skip
+    after = read_recording(write_recording(tmp_path / "r", before))
+    for signal in (
+        after.pulses["cup"], after.angles["vane"], after.reference, after.temperature,
+        after.platform,
+    ):  # fmt: skip
+        assert signal is not None
+        assert np.array_equal(signal.time, near)
+    assert (after.start, after.stop) == (int(near.min()), int(near.max()))
+    for topic in ("/c", "/v", "/w", "/t", "/odom"):
+        (note,) = (n for n in after.notes if n.startswith(f"{topic}: {len(stray)} of 2000 stamps"))
+        assert "lie far from all others" in note
+
+
+def test_clocks_that_are_set_and_long_gaps_are_no_strays() -> None:
+    set_anew = np.concatenate((spread({}), spread({})[:20] + DAY))
+    days = START + np.arange(40, dtype=np.int64) * DAY
+    for time in (set_anew, days, spread({})[:5] * 2, spread({0: -600_000_000_000})):
+        assert not strays(time).any()
+
+
+def test_impossible_winds_are_left_out_and_noted(tmp_path: Path) -> None:
+    time = spread({})
+    velocity = np.full((time.size, 3), 5.0)
+    velocity[10, 0], velocity[20, 2], velocity[30, 1] = 1e300, -151.0, 149.0
+    station = Station(
+        instruments=(cup(Input(topic="/c")),), reference=Reference(topic=Input(topic="/w"))
+    )
+    before = recorded(station, reference=Winds(time, velocity))
+    after = read_recording(write_recording(tmp_path / "r", before))
+    assert after.reference is not None
+    assert np.array_equal(after.reference.time, np.delete(time, [10, 20]))
+    assert "/w: 2 of 2000 winds are faster than 150 m/s and were left out" in after.notes
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from wind_sensors.errors import UserError, writing
 from wind_sensors.recordings.reading import read_estimates, read_recording
 from wind_sensors.report import style
 from wind_sensors.report.plots import FIGURES, Estimates, draw
+from wind_sensors.station.doubles import without_doubles
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         options.output.mkdir(parents=True, exist_ok=True)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("drawing", total=len(chosen) + 1)
-        recording = read_recording(options.recording, options.station)
+        recording = without_doubles(read_recording(options.recording, options.station))
         found = read_estimates(options.recording)
         estimates = Estimates(*found) if found is not None else None
         progress.advance(task)

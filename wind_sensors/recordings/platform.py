@@ -7,6 +7,7 @@ import numpy as np
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
 from wind_sensors.recordings.fields import columns, stamps
+from wind_sensors.recordings.plausible import stray_note, strays
 from wind_sensors.station.inputs import FieldPath, absolute, resolved
 from wind_sensors.station.model import Input, Station
 from wind_sensors.station.signals import FloatArray, PlatformStates, TimeArray
@@ -113,12 +114,19 @@ def _complete(
     position: FloatArray,
     notes: list[str],
 ) -> PlatformStates:
-    """Drop states that are not numbers and attitudes that are not rotations; unit quaternions."""
+    """Drop states that are not numbers, attitudes that are not rotations and stray stamps.
+
+    What is left has unit quaternions.
+    """
     norm = np.linalg.norm(attitude, axis=-1)
     good = np.isfinite(velocity).all(axis=-1) & np.isfinite(rate).all(axis=-1)
     good &= np.isfinite(position).all(axis=-1) & (norm > 0.5)
     bad = int(np.count_nonzero(~good))
     if bad:
         notes.append(f"{topic}: {bad} of {len(time)} states are not usable and were left out")
+    stray = strays(time)
+    if stray.any():
+        notes.append(stray_note(topic, time, stray))
+        good &= ~stray
     unit = attitude[good] / norm[good, None]
     return PlatformStates(time[good], unit, velocity[good], rate[good], position[good])

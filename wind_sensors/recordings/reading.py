@@ -14,6 +14,7 @@ from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
 from wind_sensors.recordings.fields import batches, columns, leaf, stamps
 from wind_sensors.recordings.file_order import SET_BACK
 from wind_sensors.recordings.platform import platform_states
+from wind_sensors.recordings.plausible import impossible, impossible_note, stray_note, strays
 from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
 from wind_sensors.recordings.station_files import load_station
 from wind_sensors.station.inputs import (
@@ -250,11 +251,13 @@ class _SignalReader:
         if source.meaning == "edges":
             found = batches(data.raw, self.content.types, data.message_type, path)
             time = np.concatenate([np.empty(0, dtype=np.int64), *found])
+            time = time[self._near(source.topic, time)]
             self._note_order(source.topic, time)
             return Pulses(time)
         if source.meaning == "edge":
             time = stamps(data.raw, self.content.types, data.message_type, path)
             time = time[self._stamped(source.topic, time)]
+            time = time[self._near(source.topic, time)]
             self._note_order(source.topic, time)
             return Pulses(time)
         time, raw = self._numbers(source, data, path)
@@ -319,8 +322,14 @@ class _SignalReader:
         raw = np.stack(columns(data.raw, self.content.types, data.message_type, paths), axis=-1)
         time = self._time(data)
         keep = self._finite(source.topic, np.all(np.isfinite(raw), axis=-1), time)
+        keep &= self._near(source.topic, time)
+        velocity = scaled(source, raw)
+        wrong = keep & impossible(velocity)
+        if wrong.any():
+            self.notes.append(impossible_note(source.topic, wrong))
+        keep &= ~wrong
         self._note_order(source.topic, time[keep])
-        return Winds(time[keep], scaled(source, raw[keep]))
+        return Winds(time[keep], velocity[keep])
 
     def _topic(self, source: Input, purpose: str) -> TopicData | None:
         data = self.content.topics.get(absolute(source.topic))
@@ -343,6 +352,7 @@ class _SignalReader:
         (raw,) = columns(data.raw, self.content.types, data.message_type, [path])
         time = self._time(data)
         keep = self._finite(source.topic, np.isfinite(raw), time)
+        keep &= self._near(source.topic, time)
         self._note_order(source.topic, time[keep])
         return time[keep], raw[keep]
 
@@ -383,6 +393,12 @@ class _SignalReader:
                 f"(the first at {first:.3f} s)"
             )
         return finite
+
+    def _near(self, topic: str, time: TimeArray) -> Mask:
+        stray = strays(time)
+        if stray.any():
+            self.notes.append(stray_note(topic, time, stray))
+        return ~stray
 
     def _note_order(self, topic: str, time: TimeArray) -> None:
         self.notes.extend(order_notes(topic, time))

@@ -19,6 +19,9 @@ GAS_CONSTANT_DRY_AIR = 287.05
 STANDARD_PRESSURE = 101_325.0
 """[Pa]"""
 
+MOST_INSTANTS = 50_000_000
+"""A drive of more (four weeks at 20 Hz) does not fit into a memory."""
+
 
 def air_density(temperature: npt.ArrayLike, pressure: npt.ArrayLike) -> FloatArray:
     """Density of dry air [kg/m^3] at a temperature [deg C] and a pressure [Pa]."""
@@ -96,7 +99,8 @@ def drive_from_recording(
             grid keeps its samples to the bit.
 
     Raises:
-        UserError: There is no wind, or no platform motion for a station on a platform.
+        UserError: There is no wind, or one over too long a time, or no platform motion for a
+            station on a platform.
     """
     source = wind if wind is not None else recording.reference
     if source is None or source.time.size < 2:
@@ -111,6 +115,13 @@ def drive_from_recording(
     interval = _usual_interval(stamps) if dt is None else dt
     start = int(stamps[0])
     count = int(np.floor((int(stamps[-1]) - start) * 1e-9 / interval + 1e-6)) + 1
+    if count > MOST_INSTANTS:
+        raise UserError(
+            f"{stamps.size} samples of wind, {interval:.3g} s apart, are spread over "
+            f"{count * interval / 86400.0:.0f} days: too long to simulate.",
+            recording.name,
+            "Look for wrong stamps with `wind info`; cut the recording, or sample it more slowly.",
+        )
     grid = Drive(start_ns=start, dt=interval, wind=np.zeros((count, 3)))
     times = grid.times_ns
     if stamps.size == count and np.array_equal(stamps, times):

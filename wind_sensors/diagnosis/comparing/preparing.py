@@ -26,6 +26,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import drive_from_recording
 from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
+from wind_sensors.station.doubles import without_doubles
 from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording
 from wind_sensors.station.silence import tells
@@ -66,7 +67,7 @@ def prepare(
     """
     known = recording.station if station is None else station
     believed = known if moving is None else moving
-    recording, repeated = without_repeats(recording)
+    recording, repeated = without_repeats(without_doubles(recording))
     if repeated > MOST_REPEATED:
         raise UserError(
             f"The reference repeats the same wind in {100.0 * repeated:.0f} % of its samples.",

@@ -19,6 +19,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.motion.platform_track import Motion, PlatformTrack
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
+from wind_sensors.station.doubles import without_doubles
 from wind_sensors.station.model import Cup, Rotor, Station, Vane
 from wind_sensors.station.signals import Angles, Pulses, Recording, TimeArray
 
@@ -99,6 +100,7 @@ def felt_by(recording: Recording) -> Felt:
     Raises:
         UserError: There is no rotor with a vane on a moving platform, or the record is too short.
     """
+    recording = without_doubles(recording)
     station = recording.station
     rotors = [i for i in station.instruments if isinstance(i, Rotor) and i.name in recording.pulses]
     vanes = [i for i in station.instruments if isinstance(i, Vane) and i.name in recording.angles]

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import air_density
+from wind_sensors.station.doubles import without_doubles
 from wind_sensors.station.model import Cup, Rotor, Station, Vane
 from wind_sensors.station.signals import Angles, Pulses, Recording, Series, TimeArray
 
@@ -95,6 +96,7 @@ def averages_of(recording: Recording, deviations: Mapping[str, Series] | None = 
     Raises:
         UserError: There is no pair of rotors with enough common means.
     """
+    recording = without_doubles(recording)
     station = recording.station
     interval = station.recording.averaging_time
     found: dict[str, tuple[TimeArray, FloatArray]] = {}
