@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
 
 class UserError(Exception):
     """Something the user can mend.
@@ -23,23 +19,3 @@ class UserError(Exception):
         place = f"{where}: " if where else ""
         advice = f" {remedy}" if remedy else ""
         super().__init__(f"{place}{what}{advice}")
-
-
-@contextmanager
-def writing(target: Path) -> Iterator[None]:
-    """While results are written: what the file system refuses is told like every other mistake.
-
-    Args:
-        target: File or folder that was asked for.
-
-    Raises:
-        UserError: It cannot be written.
-    """
-    try:
-        yield
-    except OSError as problem:
-        raise UserError(
-            f"this cannot be written ({problem.strerror or problem}).",
-            str(target),
-            "Choose another place with -o.",
-        ) from None

@@ -13,7 +13,8 @@ from rich.progress import Progress
 from wind_sensors.diagnosis.comparing.reference_place import Place
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.station.model import Station
 
@@ -94,9 +95,12 @@ def run(options: argparse.Namespace) -> int:
             str(options.output),
             "Choose another place with -o, or add --force.",
         )
+    if options.output.is_dir():
+        raise UserError("this is a folder.", str(options.output), "Name a file with -o.")
+    check_writable(options.output.parent)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         baseline = learnt(options.recordings, options.station, None, progress)
-    with writing(options.output):
+    with refused_in_words(options.output, "baseline"):
         options.output.parent.mkdir(parents=True, exist_ok=True)
         options.output.write_text(baseline.to_json() + "\n", encoding="utf-8")
     print(f"wrote {options.output} from {len(baseline.recordings)} healthy recordings")

@@ -16,7 +16,8 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.regions import region_bank, strongest
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.comparison_files import NAMES, NO_READINGS, unread, write
 from wind_sensors.report.diagnosis_files import make_way
@@ -69,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
         bank = region_bank(whitener, simulated)
         found = strongest(whitener, bank, whitener.of(simulated), simulated, 12)
         p = bank.p_value(found[0].score)
-        with writing(options.output):
+        with refused_in_words(options.output):
             written = write(options.output, comparison, simulated, found, p)
     console = Console()
     table = Table(box=None)

@@ -15,7 +15,8 @@ from wind_sensors.cli.other_references import diagnose_otherwise, other_referenc
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.diagnosis_files import make_way, write
 from wind_sensors.report.diagnosis_page import when_text
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
             progress.update(tasks[phase], completed=share)
 
         diagnosis = diagnose(recording, baseline, effects, workers(), report)
-        with writing(options.output):
+        with refused_in_words(options.output):
             written = write(options.output, diagnosis, without=sorted(set(options.without)))
     _print(Console(), diagnosis)
     if options.without:

@@ -8,7 +8,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import track
 
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.report.paper_figures import FIGURES, render
 
 
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
             "the file is already there.", str(present[0]), "Use --force to replace it."
         )
     console = Console()
-    with writing(folder):
+    with refused_in_words(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name in track(names, description="drawing", console=console, transient=True):
             render(name, targets[name])

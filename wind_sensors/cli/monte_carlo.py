@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.report.monte_carlo import Row, run_monte_carlo, table_markdown
 from wind_sensors.report.monte_carlo_cases import standard_cases
 
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     # One row, one line, also where the output is not a terminal.
     Console(width=max(console.width, 130)).print(_table(rows))
     if target is not None:
-        with writing(target):
+        with refused_in_words(target):
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(table_markdown(rows), encoding="utf-8")
         console.print(f"wrote {target}")

@@ -13,7 +13,8 @@ from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
 from wind_sensors.diagnosis.means.healthy import learn_means
 from wind_sensors.diagnosis.outcome import Outcome
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_recording, read_series
 from wind_sensors.report.outcome_files import write_outcome
 from wind_sensors.station.model import Rotor
@@ -66,7 +67,7 @@ def diagnose_otherwise(
         outcome = _of_means(options, recording, report)
     else:
         outcome = diagnose_latent(recording, report)
-    with writing(options.output):
+    with refused_in_words(options.output):
         written = write_outcome(options.output, outcome)
     progress.stop()
     print_outcome(Console(), outcome)

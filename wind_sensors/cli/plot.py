@@ -8,7 +8,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from wind_sensors.errors import UserError, writing
+from wind_sensors.errors import UserError
+from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.reading import read_estimates, read_recording
 from wind_sensors.report import style
 from wind_sensors.report.plots import FIGURES, Estimates, draw
@@ -44,8 +45,7 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.output.exists() and not options.output.is_dir():
         raise UserError("this is no folder.", str(options.output), "Choose another place with -o.")
-    with writing(options.output):
-        options.output.mkdir(parents=True, exist_ok=True)
+    check_writable(options.output)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("drawing", total=len(chosen) + 1)
         recording = without_doubles(read_recording(options.recording, options.station))
@@ -56,7 +56,9 @@ def run(options: argparse.Namespace) -> int:
         for name in chosen:
             figure = draw(name, recording, estimates)
             if figure is not None:
-                style.save(figure, str(paths[name]))
+                with refused_in_words(paths[name], "figure"):
+                    options.output.mkdir(parents=True, exist_ok=True)
+                    style.save(figure, str(paths[name]))
                 written.append(paths[name])
             progress.advance(task)
     for path in written:

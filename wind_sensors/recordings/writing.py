@@ -16,6 +16,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.estimate_topics import estimate_topics
 from wind_sensors.recordings.other_topics import CopiedMessage, OtherTopics
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.raw_topics import raw_topics
 from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.serialising import TopicMessages
@@ -83,20 +84,17 @@ def write_topics(
     target = Path(folder)
     clear_target(target, force=force)
     partial = target.with_name(f".{target.name}.partial")
-    try:
-        if partial.exists():
-            shutil.rmtree(partial)
-        partial.mkdir(parents=True)
-        (partial / STATION_FILE).write_text(station_text, encoding="utf-8")
-        _write_bag(partial / BAG_FOLDER, topics, others)
-        partial.rename(target)
-    except OSError as problem:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise UserError(
-            f"the recording cannot be written ({problem.strerror}).",
-            str(folder),
-            "Choose another place with -o.",
-        ) from None
+    with refused_in_words(folder, "recording"):
+        try:
+            if partial.exists():
+                shutil.rmtree(partial)
+            partial.mkdir(parents=True)
+            (partial / STATION_FILE).write_text(station_text, encoding="utf-8")
+            _write_bag(partial / BAG_FOLDER, topics, others)
+            partial.rename(target)
+        except OSError:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise
     return target
 
 

@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.comparing.observation import channels_of
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.json_output import silent_json
 from wind_sensors.diagnosis.regions import Found
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.serialising import TopicMessages
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.recordings.writing import write_topics
@@ -81,8 +82,10 @@ def write(
         simulated: Simulation of the station.
         found: Regions where the residual stands out most.
         p: Probability of the largest on a healthy day.
+
+    Raises:
+        UserError: Nothing can be written there.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     summary = channel_summary(comparison, simulated)
     regions = [
         {
@@ -96,7 +99,6 @@ def write(
     content = {"recording": comparison.recording.name, "channels": summary,
                "silent": silent_json(silent), "notes": list(comparison.recording.notes),
                "regions": regions, "p": p}  # fmt: skip
-    (folder / "comparison.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     rows = "".join(
         f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
         f"<td class='n'>{f.excess:.3g} {escape(f.unit)}</td><td class='n'>{f.score:.1f}</td></tr>"
@@ -129,12 +131,15 @@ def write(
         "<table><tr><th>channel</th><th>where</th><th>residual</th><th>score</th></tr>"
         f"{rows}</table></div></section>"
     )
-    (folder / "comparison.html").write_text(
-        document(f"Comparison of {comparison.recording.name}", body), encoding="utf-8"
-    )
     topics: list[TopicMessages] = series_topics(
         comparison, {"measured": comparison.measured, "simulated": simulated}
     )
     station = station_to_yaml(comparison.recording.station, shipped_profiles())
-    write_topics(folder / "residuals", station, topics)
+    page = document(f"Comparison of {comparison.recording.name}", body)
+    with refused_in_words(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(content, indent=1) + "\n"
+        (folder / "comparison.json").write_text(text, encoding="utf-8")
+        (folder / "comparison.html").write_text(page, encoding="utf-8")
+        write_topics(folder / "residuals", station, topics)
     return [folder / name for name in NAMES]

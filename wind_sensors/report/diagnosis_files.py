@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.json_output import as_json
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.recordings.writing import keep_inputs, write_topics
@@ -36,11 +37,12 @@ def make_way(
     """Clear a folder of what a command wrote before.
 
     Raises:
-        UserError: Something is there and `force` is not given, or it is not a folder, or what is
-            there is one of the command's inputs.
+        UserError: Something is there and `force` is not given, it is not a folder, nothing can be
+            written there, or what is there is one of the command's inputs.
     """
     if folder.exists() and not folder.is_dir():
         raise UserError("this is no folder.", str(folder), "Choose another place with -o.")
+    check_writable(folder)
     taken = [folder / name for name in names if (folder / name).exists()]
     if taken and not force:
         raise UserError(
@@ -95,22 +97,26 @@ def write(folder: Path, diagnosis: Diagnosis, without: Sequence[str] = ()) -> li
 
     Returns:
         What was written.
+
+    Raises:
+        UserError: Nothing can be written there.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    station_text = station_to_yaml(diagnosis.station, shipped_profiles())
-    (folder / "diagnosis.json").write_text(
-        json.dumps({**as_json(diagnosis), "catalogue_without": list(without)}, indent=1) + "\n",
-        encoding="utf-8",
-    )
-    (folder / "report.html").write_text(page(diagnosis, without), encoding="utf-8")
-    (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
-    topics = series_topics(
-        diagnosis.comparison,
-        {
-            "measured": diagnosis.comparison.measured,
-            "simulated": diagnosis.simulated,
-            "corrected": diagnosis.corrected,
-        },
-    )
-    write_topics(folder / "residuals", station_text, topics)
+    with refused_in_words(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        station_text = station_to_yaml(diagnosis.station, shipped_profiles())
+        (folder / "diagnosis.json").write_text(
+            json.dumps({**as_json(diagnosis), "catalogue_without": list(without)}, indent=1) + "\n",
+            encoding="utf-8",
+        )
+        (folder / "report.html").write_text(page(diagnosis, without), encoding="utf-8")
+        (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
+        topics = series_topics(
+            diagnosis.comparison,
+            {
+                "measured": diagnosis.comparison.measured,
+                "simulated": diagnosis.simulated,
+                "corrected": diagnosis.corrected,
+            },
+        )
+        write_topics(folder / "residuals", station_text, topics)
     return [folder / name for name in NAMES]

@@ -9,6 +9,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.outcome import Outcome, outcome_json
 from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.recordings.writing import write_topics
@@ -38,16 +39,19 @@ def write_outcome(folder: Path, outcome: Outcome) -> list[Path]:
 
     Returns:
         What was written.
+
+    Raises:
+        UserError: Nothing can be written there.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     station_text = station_to_yaml(outcome.station, shipped_profiles())
-    (folder / "diagnosis.json").write_text(
-        json.dumps(outcome_json(outcome), indent=1) + "\n", encoding="utf-8"
-    )
-    (folder / "report.html").write_text(outcome_page(outcome), encoding="utf-8")
-    (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
+    text, page = json.dumps(outcome_json(outcome), indent=1) + "\n", outcome_page(outcome)
     topics = _residual_topics(outcome)
-    if not topics:
-        return [folder / name for name in NAMES[:3]]
-    write_topics(folder / "residuals", station_text, topics)
+    with refused_in_words(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "diagnosis.json").write_text(text, encoding="utf-8")
+        (folder / "report.html").write_text(page, encoding="utf-8")
+        (folder / "station_corrected.yaml").write_text(station_text, encoding="utf-8")
+        if not topics:
+            return [folder / name for name in NAMES[:3]]
+        write_topics(folder / "residuals", station_text, topics)
     return [folder / name for name in NAMES]
