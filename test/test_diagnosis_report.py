@@ -16,9 +16,12 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
+from wind_sensors.diagnosis.json_output import as_json, finding_json
+from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.diagnosis.smallest_size import smallest_size
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.report.diagnosis_figures import activity_figure, statistics_figure
-from wind_sensors.report.diagnosis_page import page, when_text
+from wind_sensors.report.diagnosis_page import page, when_text, where_text
 
 
 @lru_cache(maxsize=1)
@@ -104,6 +107,87 @@ def test_the_page_tells_name_size_and_what_is_left() -> None:
     assert "step 8 deg" in text
     assert "Raw signals, vane, vane angle" in text
     assert "usual to" in text
+
+
+@pytest.mark.parametrize(
+    ("kind", "label", "told"),
+    [
+        ("all", "everywhere", "over the whole record"),
+        ("time", "0 to 57 s", "in the part of the record from 0 to 57 s"),
+        ("speed", "4.1 to 5.5 m/s", "at wind speeds of 4.1 to 5.5 m/s"),
+        ("speed", "below 5.5 m/s", "at wind speeds below 5.5 m/s"),
+        ("direction", "wind from 0 to 10 deg from north", "in wind from 0 to 10 deg from north"),
+        ("heading", "heading 45 deg", "at headings from 45 to 90 deg"),
+        ("frequency", "0.0784 to 0.142 Hz", "at 0.0784 to 0.142 Hz"),
+        ("spectrum", "power of eddies of 2 to 4 m", "in the power of eddies of 2 to 4 m"),
+        ("statistic", "steps of the readings", "in the steps of the readings"),
+    ],
+)
+def test_regions_are_parts_of_sentences(kind: str, label: str, told: str) -> None:
+    assert where_text(Region("cup/rotor_rate", kind, 45.0, 90.0, label)) == told
+
+
+def test_the_page_gives_the_evidence_for_a_name() -> None:
+    found = stepped()
+    finding = found.findings[0]
+    region = Region("cup/rotor_rate", "frequency", 0.08, 0.14, "0.08 to 0.14 Hz")
+    located = Found(region, 9.0, 0.485, "m/s")
+    small = replace(finding, located=located, p=0.078, gain=88.12, share=0.5)
+    text = page(replace(found, findings=(small,)))
+    assert (
+        "The mismatch is largest <b>at 0.08 to 0.14 Hz</b> (cup, rotor rate): the residual "
+        "scatters by 0.485 m/s in all, p = 0.078 after looking everywhere. The effect removes "
+        "50 % of the whole misfit and lowers minus twice the log-likelihood by 88.1: that names it"
+    ) in text
+    assert finding_json(small, 400.0)["gain"] == 88.12
+    assert finding_json(replace(small, gain=0.0), 400.0)["gain"] is None
+    assert "that names it" not in page(replace(found, findings=(replace(small, p=0.002),)))
+
+
+def test_nothing_blue_is_promised_where_nothing_is_named() -> None:
+    found = stepped()
+    assert "Blue: with the named physics" in page(found)
+    assert "Blue" not in page(replace(found, verdict="unknown", findings=()))
+
+
+def test_the_page_tells_why_nothing_can_be_told() -> None:
+    found = stepped()
+    reason = "the wind is below 4.0 m/s nearly all the time"
+    left = replace(found.unexplained, description=reason)
+    calm = replace(found, verdict="inconclusive", findings=(), unexplained=left)
+    assert f"<p>{reason}.</p>" in page(calm)
+
+
+def test_a_mast_is_not_told_to_look_along_a_keel() -> None:
+    found = stepped()
+    offset = Term(catalogue()["vane_offset"], "vane", {"offset": 5.0})
+    turned = replace(found, findings=(replace(found.findings[0], term=offset),))
+    assert "frame_error" in offset.effect.confusable
+    text = page(turned)
+    assert "What to measure next" in text
+    assert "frame error" not in text
+    assert "keel" not in text
+
+
+def test_smallest_sizes_say_what_they_are_sizes_of() -> None:
+    found = stepped()
+    sizes = found.smallest_detectable
+    assert sizes["air_density"].parameter == "density_ratio"
+    assert sizes["flow_distortion"].parameter == "cosine_1 or sine_1 or cosine_2 or sine_2"
+    assert all(size.parameter for size in sizes.values())
+    text = page(found)
+    value = f"{sizes['air_density'].value:.3g}"
+    assert f"<td>density ratio {value} (share)</td>" in text
+    assert "if everything else were known" in text
+    told = as_json(found)["smallest_detectable"]["calibration_offset"]
+    assert (told["parameter"], told["unit"]) == ("offset", "m/s")
+
+
+def test_the_parameter_of_a_smallest_size_is_one_that_was_tried() -> None:
+    missed = catalogue()["missed_pulses"]
+    assert smallest_size(missed, 0.003, "1", 0.3).parameter == "loss_probability"
+    tilted = catalogue()["angular_response"]
+    assert smallest_size(tilted, 0.2, "1", 2.0).parameter == "skewness"
 
 
 @pytest.mark.parametrize(

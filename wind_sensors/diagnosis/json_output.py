@@ -37,8 +37,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
             ],
         },
         "smallest_detectable": {
-            key: {"value": _rounded(value), "unit": unit}
-            for key, (value, unit) in diagnosis.smallest_detectable.items()
+            key: {"value": _rounded(s.value), "unit": s.unit, "parameter": s.parameter}
+            for key, s in diagnosis.smallest_detectable.items()
         },
     }  # fmt: skip
 
@@ -69,6 +69,7 @@ def finding_json(finding: Finding, length: float) -> dict[str, Any]:
             "share": _rounded(finding.share),
             "p": finding.p,
         },
+        "gain": _rounded(finding.gain) if finding.gain else None,
         "physics": term.effect.meaning,
         "equation": term.effect.equation,
         "source": term.effect.source,

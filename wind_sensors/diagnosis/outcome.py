@@ -12,6 +12,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.json_output import finding_json
 from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
+from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -49,7 +50,7 @@ class Outcome:
         calibrated: Whether healthy recordings stand behind the null.
         findings: Named effects; of an ambiguous set, all members.
         unexplained: What is left.
-        smallest_detectable: By effect and instrument: value and unit.
+        smallest_detectable: By effect and instrument: the least size that would have shown.
         station: The station with the named physics.
         length: Of the recording [s].
         reference: What took the place of a measured wind, for people.
@@ -63,7 +64,7 @@ class Outcome:
     calibrated: bool
     findings: tuple[Finding, ...]
     unexplained: Unexplained
-    smallest_detectable: Mapping[str, tuple[float, str]]
+    smallest_detectable: Mapping[str, SmallestSize]
     station: Station
     length: float
     reference: str
@@ -104,7 +105,7 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
         },
         "declined": list(outcome.declined),
         "smallest_detectable": {
-            key: {"value": float(f"{value:.4g}"), "unit": unit}
-            for key, (value, unit) in outcome.smallest_detectable.items()
+            key: {"value": float(f"{s.value:.4g}"), "unit": s.unit, "parameter": s.parameter}
+            for key, s in outcome.smallest_detectable.items()
         },
     }

@@ -24,6 +24,7 @@ from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
 from wind_sensors.diagnosis.proving.judging import judgement_of
 from wind_sensors.diagnosis.regions import Found, RegionBank
+from wind_sensors.diagnosis.smallest_size import SmallestSize, smallest_size
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.silence import Silent, silent_instruments
@@ -47,7 +48,7 @@ class Diagnosis:
         calibrated: Whether healthy recordings stand behind the null.
         findings: Named effects; of an ambiguous set, all members.
         unexplained: What is left.
-        smallest_detectable: By effect and instrument: value and unit.
+        smallest_detectable: By effect: the least size that would have been told from nought.
         station: The station with the named physics.
         baseline: What was normal.
         comparison, naming, simulated, corrected: For reports.
@@ -60,7 +61,7 @@ class Diagnosis:
     calibrated: bool
     findings: tuple[Finding, ...]
     unexplained: Unexplained
-    smallest_detectable: Mapping[str, tuple[float, str]]
+    smallest_detectable: Mapping[str, SmallestSize]
     station: Station
     baseline: Baseline
     comparison: Comparison = field(repr=False)
@@ -211,7 +212,9 @@ def diagnose(
         unexplained=Unexplained(
             remainder.p, remainder.share, judged.regions, "; ".join(part for part in told if part)
         ),
-        smallest_detectable={k: (v, unit) for k, (v, unit, _) in judged.detectable.items()},
+        smallest_detectable={
+            name: smallest_size(known[name], *size) for name, size in judged.detectable.items()
+        },
         station=station,
         baseline=baseline,
         comparison=comparison,

@@ -10,10 +10,10 @@ import numpy as np
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
-from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORES
+from wind_sensors.diagnosis.proving.decision import REMAINDER_P, REMAINDER_SCORES
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
-from wind_sensors.diagnosis.regions import OF_POWER, Found
+from wind_sensors.diagnosis.regions import OF_POWER, Found, Region
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.cuts import CUTS_STYLE, in_both_cuts
 from wind_sensors.report.diagnosis_figures import (
@@ -23,7 +23,7 @@ from wind_sensors.report.diagnosis_figures import (
     statistics_figure,
 )
 from wind_sensors.report.names import names_of, words
-from wind_sensors.report.sizes import number_text, sizes_of
+from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
 from wind_sensors.station.model import Station
 
 STYLE = """
@@ -130,12 +130,50 @@ def _physics(finding: Finding, station: Station) -> str:
         f"<div class='scroll'><table><tr><th>parameter</th><th class='n'>value</th>"
         f"<th class='n'>95 % interval</th>"
         f"<th>unit</th></tr>{rows}</table></div>"
-        f"<p>The mismatch is largest in <b>{escape(region.label)}</b> "
-        f"({escape(channel_words(region.channel))}): "
-        f"{_excess(finding.located)}p = {finding.p:.3g} "
-        f"after looking everywhere; {100.0 * finding.share:.0f} % of the whole misfit.</p>"
+        f"<p>The mismatch is largest <b>{escape(where_text(region))}</b> "
+        f"({escape(channel_words(region.channel))}): {_mismatch(finding.located)}, "
+        f"p = {finding.p:.3g} after looking everywhere. The effect removes "
+        f"{100.0 * finding.share:.0f} % of the whole misfit{_gain(finding)}.</p>"
         "</section>"
     )
+
+
+_AT = {
+    "time": "in the part of the record from ",
+    "speed": "at wind speeds ",
+    "direction": "in ",
+    "frequency": "at ",
+}
+"""What goes before the label of a region that is no part of the signals' power."""
+
+
+def where_text(region: Region) -> str:
+    """A region as a part of a sentence."""
+    if region.kind == "all":
+        return "over the whole record"
+    if region.kind == "speed" and region.label[0].isdigit():
+        return f"at wind speeds of {region.label}"
+    if region.kind == "heading":
+        return f"at headings from {region.low:.0f} to {region.high:.0f} deg"
+    return _AT.get(region.kind, "in the ") + region.label
+
+
+def _mismatch(found: Found) -> str:
+    """How large the residual is; of what shows in no series, how far it scatters."""
+    size = f"{number_text(found.excess)} {escape(found.unit)}"
+    if found.region.kind in OF_POWER:
+        return f"the residual scatters by {size} in all"
+    return f"{size} on average"
+
+
+def _gain(finding: Finding) -> str:
+    """The evidence for the name beyond the place where the mismatch is largest."""
+    if finding.gain <= 0.0:
+        return ""
+    text = f" and lowers minus twice the log-likelihood by {number_text(finding.gain)}"
+    if finding.p > REMAINDER_P:
+        text += ": that names it, for no single region stands out by itself"
+    return text
 
 
 def _excess(found: Found) -> str:
@@ -187,12 +225,22 @@ def _checks(proof: Proof) -> str:
     return f"<div class='scroll'><table>{head}{lines}</table></div>"
 
 
+def _can_have(station: Station, name: str) -> bool:
+    """Whether any part of a station can have an effect."""
+    effect = catalogue()[name]
+    carrier = station.platform
+    on_carrier = carrier is not None and effect.applies(carrier, station)
+    return on_carrier or any(effect.applies(entry, station) for entry in station.instruments)
+
+
 def _next(diagnosis: Diagnosis) -> str:
     lines = []
     for finding in diagnosis.findings:
         effect = finding.term.effect
         others = {name for name, _, _ in finding.alternatives}
         for name, measurement in effect.confusable.items():
+            if not _can_have(diagnosis.station, name):
+                continue
             mark = " (close here)" if name in others else ""
             lines.append(
                 f"<li>against {escape(words(name))}{mark}: {escape(measurement)}</li>"
@@ -232,14 +280,16 @@ def _left(diagnosis: Diagnosis) -> str:
 def _detectable(diagnosis: Diagnosis) -> str:
     known = catalogue()
     rows = "".join(
-        f"<tr><td>{escape(words(name))}</td><td class='n'>{number_text(value)} "
-        f"{'' if unit == '1' else escape(unit)}</td>"
+        f"<tr><td>{escape(words(name))}</td><td>{escape(smallest_text(size))}</td>"
         f"<td>{escape(known[name].meaning if name in known else '')}</td></tr>"
-        for name, (value, unit) in sorted(diagnosis.smallest_detectable.items())
+        for name, size in sorted(diagnosis.smallest_detectable.items())
     )
     return (
         "<section><details><summary>The smallest size of each effect that this recording could "
-        "have shown</summary><div class='scroll'><table><tr><th>effect</th><th class='n'>size</th>"
+        "have shown</summary><p>How far the parameter would have to be from its healthy value to "
+        "be told from it, if everything else were known. A size that is fitted beside others is "
+        "known less well: its interval is wider.</p>"
+        "<div class='scroll'><table><tr><th>effect</th><th>size</th>"
         f"<th>meaning</th></tr>{rows}</table></div></details></section>"
     )
 
@@ -283,10 +333,10 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
         f"{escape(diagnosis.recording)} · wind diagnose</div>"
         f"<h1>{escape(_headline(diagnosis))}</h1>{_summary(diagnosis)}</header>",
-        "<section><h2>Before and after</h2>"
+        f"<section><h2>{'Before and after' if corrected else 'Recorded minus simulated'}</h2>"
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
-        "described. Blue: with the named physics. Bars are two standard errors; grey is what "
-        "healthy days show.</p>"
+        f"described. {'Blue: with the named physics. ' if corrected else ''}Bars are two standard "
+        "errors; grey is what healthy days show.</p>"
         + "".join(figures)
         + "</section>",
         *(_physics(f, diagnosis.station) for f in diagnosis.findings),

@@ -14,7 +14,7 @@ from wind_sensors.report import style
 from wind_sensors.report.cuts import in_both_cuts, title_for
 from wind_sensors.report.diagnosis_page import VERDICTS, document
 from wind_sensors.report.names import names_of, words
-from wind_sensors.report.sizes import number_text, sizes_of
+from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
 from wind_sensors.station.model import Station
 
 
@@ -124,8 +124,8 @@ def outcome_page(outcome: Outcome) -> str:
     )
     left = outcome.unexplained.description or "Nothing that matters."
     detectable = tuple(
-        f"{words(name)}: {number_text(value)}{'' if unit == '1' else ' ' + unit}"
-        for name, (value, unit) in sorted(outcome.smallest_detectable.items())
+        f"{words(name)}: {smallest_text(size)}"
+        for name, size in sorted(outcome.smallest_detectable.items())
     )
     body = [
         f"<header class='verdict {outcome.verdict}'><div class='muted'>"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.report.names import words
 from wind_sensors.station.model import Station
 
@@ -37,6 +38,12 @@ class Size:
 def number_text(value: float) -> str:
     """Three digits."""
     return f"{value:.3g}" if np.isfinite(value) else "?"
+
+
+def smallest_text(size: SmallestSize) -> str:
+    """A smallest size with its parameter and its unit."""
+    unit = "(share)" if size.unit == "1" else size.unit
+    return f"{words(size.parameter)} {number_text(size.value)} {unit}".strip()
 
 
 def sizes_of(finding: Finding, station: Station) -> list[Size]:

@@ -28,6 +28,7 @@ from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
@@ -291,7 +292,7 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
     return tuple(lines)
 
 
-def _smallest(bench: Bench, station: Station) -> dict[str, tuple[float, str]]:
+def _smallest(bench: Bench, station: Station) -> dict[str, SmallestSize]:
     """Sizes that the record would have shown, at 3.3 standard errors over blocks."""
     effects = latent_effects(station)
     found = {}
@@ -306,7 +307,9 @@ def _smallest(bench: Bench, station: Station) -> dict[str, tuple[float, str]]:
         error = float(np.sqrt(np.sum(scores**2)) / max(float(np.sum((g / bench.noise) ** 2)), 1e-9))
         parameter = effect.parameters[0]
         moved = abs(effect.templates[0][parameter.name] - (parameter.healthy or 0.0))
-        found[f"{name}/{PLATFORM}"] = (3.3 * error * moved, parameter.unit)
+        found[f"{name}/{PLATFORM}"] = SmallestSize(
+            3.3 * error * moved, parameter.unit, parameter.name
+        )
     return found
 
 

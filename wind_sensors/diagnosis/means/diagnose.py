@@ -41,6 +41,7 @@ from wind_sensors.diagnosis.means.vanes import (
 )
 from wind_sensors.diagnosis.outcome import Outcome, verdict_of
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
+from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.errors import UserError
 from wind_sensors.station.signals import Recording, Series
 
@@ -108,7 +109,7 @@ def diagnose_means(
     findings += [finding_of_ice(averages, i) for i in icy]
     terms: list[Term] = []
     shown = []
-    smallest: dict[str, tuple[float, str]] = {}
+    smallest: dict[str, SmallestSize] = {}
     worst = Unexplained(1.0, 0.0, (), "")
     number = 0
     for first, second in pairs:

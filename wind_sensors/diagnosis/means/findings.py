@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.diagnosis.smallest_size import SmallestSize
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -64,7 +65,7 @@ class PairWork:
             cost += np.bincount(bench.block[other], huber(left), bench.blocks)
         return cost
 
-    def smallest(self) -> dict[str, tuple[float, str]]:
+    def smallest(self) -> dict[str, SmallestSize]:
         """Sizes that this pair would have shown, at 3.3 standard errors over blocks."""
         bench = self.bench
         base = planted(bench.station, self.explained.terms)
@@ -80,7 +81,9 @@ class PairWork:
             scores = np.bincount(bench.block, psi * g, bench.blocks)
             error = float(np.sqrt(np.sum(scores**2))) / max(float(g @ g), 1e-9)
             moved = abs(effect.templates[0][parameter.name] - (parameter.healthy or 0.0))
-            found[f"{name}/{self.pair.name}"] = (3.3 * error * moved, parameter.unit)
+            found[f"{name}/{self.pair.name}"] = SmallestSize(
+                3.3 * error * moved, parameter.unit, parameter.name
+            )
         return found
 
 
