@@ -20,10 +20,13 @@ from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.vane_guesses import vane_guesses
 from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.json_output import as_json
+from wind_sensors.diagnosis.outcome import Outcome, outcome_json, with_silent
+from wind_sensors.diagnosis.proving.findings import Unexplained
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.recordings import write_recording
 from wind_sensors.report.diagnosis_page import page
+from wind_sensors.report.outcome_page import outcome_page
 from wind_sensors.station.model import Vane
 from wind_sensors.station.signals import Angles, Recording
 from wind_sensors.station.silence import FEWEST_READINGS, silent_instruments
@@ -111,6 +114,18 @@ def test_a_cup_that_says_nothing_is_told_beside_a_name() -> None:
 def test_no_baseline_is_learnt_from_what_says_nothing(dead: Callable[[], Recording]) -> None:
     with pytest.raises(UserError, match=r"'vane' has no readings.*not healthy"):
         learn([recorded(STATION, 57), dead()])
+
+
+def test_other_diagnoses_tell_of_what_says_nothing() -> None:
+    nothing = Unexplained(1.0, 0.0, (), "")
+    well = Outcome("r", "none", True, (), nothing, {}, STATION, 400.0, "latent")
+    assert with_silent(well, ()) is well
+    told = with_silent(well, silent_instruments(without_vane(), STATION))
+    assert told.verdict == "unknown"
+    assert outcome_json(told)["silent"][0]["instrument"] == "vane"
+    assert "<h1>Vane says nothing at all</h1>" in outcome_page(told)
+    assert "<b>Silent:</b> vane: no readings at all" in outcome_page(told)
+    assert with_silent(replace(well, verdict="named"), told.silent).verdict == "named"
 
 
 def test_commands_tell_of_what_says_nothing(

@@ -12,13 +12,14 @@ from rich.progress import Progress, TaskID
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
 from wind_sensors.diagnosis.means.healthy import learn_means
-from wind_sensors.diagnosis.outcome import Outcome
+from wind_sensors.diagnosis.outcome import Outcome, with_silent
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_recording, read_series
 from wind_sensors.report.outcome_files import write_outcome
 from wind_sensors.station.model import Rotor
 from wind_sensors.station.signals import Recording, Series
+from wind_sensors.station.silence import silent_instruments
 
 DEVIATION = "_deviation"
 """A rotor's topic with this behind it holds the standard deviations of its means."""
@@ -67,6 +68,7 @@ def diagnose_otherwise(
         outcome = _of_means(options, recording, report)
     else:
         outcome = diagnose_latent(recording, report)
+    outcome = with_silent(outcome, silent_instruments(recording, recording.station))
     with refused_in_words(options.output):
         written = write_outcome(options.output, outcome)
     progress.stop()

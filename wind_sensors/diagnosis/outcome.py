@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.json_output import finding_json
+from wind_sensors.diagnosis.json_output import finding_json, silent_json
 from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
 from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.station.model import Station
+from wind_sensors.station.silence import Silent
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -57,6 +58,7 @@ class Outcome:
         declined: What was seen and not claimed, and why.
         panels: Figures.
         healthy: Names of the healthy recordings.
+        silent: Instruments of the station that say nothing in the whole recording.
     """
 
     recording: str
@@ -71,6 +73,7 @@ class Outcome:
     declined: tuple[str, ...] = ()
     panels: tuple[Panel, ...] = ()
     healthy: tuple[str, ...] = ()
+    silent: tuple[Silent, ...] = ()
 
 
 def verdict_of(findings: tuple[Finding, ...], unexplained: Unexplained, limit: float) -> Verdict:
@@ -90,6 +93,25 @@ def verdict_of(findings: tuple[Finding, ...], unexplained: Unexplained, limit: f
     return "none"
 
 
+def with_silent(outcome: Outcome, silent: Sequence[Silent]) -> Outcome:
+    """The outcome with what is said of instruments that say nothing: that all is well is not.
+
+    Args:
+        outcome: Without a word of them.
+        silent: Instruments of the station that say nothing in the whole recording.
+    """
+    if not silent:
+        return outcome
+    said = (*(each.words for each in silent), outcome.unexplained.description)
+    description = "; ".join(part for part in said if part)
+    return replace(
+        outcome,
+        verdict="unknown" if outcome.verdict == "none" else outcome.verdict,
+        unexplained=replace(outcome.unexplained, description=description),
+        silent=tuple(silent),
+    )
+
+
 def outcome_json(outcome: Outcome) -> dict[str, Any]:
     """The content of `diagnosis.json`."""
     return {
@@ -103,6 +125,7 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
             "share": round(outcome.unexplained.share, 4),
             "description": outcome.unexplained.description,
         },
+        "silent": silent_json(outcome.silent),
         "declined": list(outcome.declined),
         "smallest_detectable": {
             key: {"value": float(f"{s.value:.4g}"), "unit": s.unit, "parameter": s.parameter}

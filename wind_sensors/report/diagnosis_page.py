@@ -22,9 +22,10 @@ from wind_sensors.report.diagnosis_figures import (
     residual_figure,
     statistics_figure,
 )
-from wind_sensors.report.names import names_of, words
+from wind_sensors.report.names import names_of, silence_of, words
 from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
 from wind_sensors.station.model import Station
+from wind_sensors.station.silence import Silent
 
 STYLE = """
 :root{--ink:#22303c;--muted:#5d6b77;--line:#e3e8ec;--blue:#1f6fb2;--orange:#b96a1c;--green:#3d7f52}
@@ -60,10 +61,8 @@ VERDICTS = {
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    headline = names_of(diagnosis.findings) or VERDICTS[diagnosis.verdict]
-    if diagnosis.silent and not diagnosis.findings:
-        names = " and ".join(s.instrument for s in diagnosis.silent)
-        headline = f"{names} {'says' if len(diagnosis.silent) == 1 else 'say'} nothing at all"
+    named, silence = names_of(diagnosis.findings), silence_of(diagnosis.silent)
+    headline = named or silence or VERDICTS[diagnosis.verdict]
     return headline[0].upper() + headline[1:]
 
 
@@ -73,6 +72,11 @@ def when_text(term: Term) -> str:
         begin, end = term.interval
         return f"from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
     return "" if "start" in term.values else "all the time"
+
+
+def silent_paragraphs(silent: Sequence[Silent]) -> str:
+    """What is said of instruments that say nothing."""
+    return "".join(f"<p><b>Silent:</b> {escape(each.words)}.</p>" for each in silent)
 
 
 def _left_over(diagnosis: Diagnosis) -> list[str]:
@@ -85,7 +89,7 @@ def _left_over(diagnosis: Diagnosis) -> list[str]:
 def _summary(diagnosis: Diagnosis) -> str:
     verdict = VERDICTS[diagnosis.verdict]
     lines = [f"<p class='muted'>{escape(verdict)}.</p>"] if diagnosis.findings else []
-    lines += [f"<p><b>Silent:</b> {escape(silent.words)}.</p>" for silent in diagnosis.silent]
+    lines.append(silent_paragraphs(diagnosis.silent))
     for finding in diagnosis.findings:
         term = finding.term
         text = "; ".join(size.text for size in sizes_of(finding, diagnosis.station))

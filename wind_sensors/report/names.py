@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from wind_sensors.diagnosis.proving.findings import Finding
+from wind_sensors.station.silence import Silent
 
 
 def words(effect: str) -> str:
     """An identifier for people."""
     return effect.replace("_", " ")
+
+
+def silence_of(silent: Sequence[Silent]) -> str:
+    """That some instruments say nothing, in a few words; empty if there are none."""
+    if not silent:
+        return ""
+    names = " and ".join(each.instrument for each in silent)
+    return f"{names} {'says' if len(silent) == 1 else 'say'} nothing at all"
 
 
 def names_of(findings: Sequence[Finding]) -> str:

@@ -12,8 +12,8 @@ from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
 from wind_sensors.report.cuts import in_both_cuts, title_for
-from wind_sensors.report.diagnosis_page import VERDICTS, document
-from wind_sensors.report.names import names_of, words
+from wind_sensors.report.diagnosis_page import VERDICTS, document, silent_paragraphs
+from wind_sensors.report.names import names_of, silence_of, words
 from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
 from wind_sensors.station.model import Station
 
@@ -99,7 +99,8 @@ def _headline(outcome: Outcome) -> str:
             name = words(finding.term.effect.name)
             instruments.setdefault(name, {})[finding.term.instrument] = None
     named = "; ".join(f"{name} ({', '.join(on)})" for name, on in instruments.items())
-    headline = named or names_of(outcome.findings) or VERDICTS[outcome.verdict]
+    headline = named or names_of(outcome.findings) or silence_of(outcome.silent)
+    headline = headline or VERDICTS[outcome.verdict]
     return headline[0].upper() + headline[1:]
 
 
@@ -132,7 +133,8 @@ def outcome_page(outcome: Outcome) -> str:
         f"{escape(outcome.recording)} · wind diagnose</div>"
         f"<h1>{escape(_headline(outcome))}</h1>"
         f"<p class='muted'>{escape(VERDICTS[outcome.verdict])}. Reference: "
-        f"{escape(outcome.reference)}. {escape(calibrated)}</p></header>",
+        f"{escape(outcome.reference)}. {escape(calibrated)}</p>"
+        f"{silent_paragraphs(outcome.silent)}</header>",
         _effects(outcome.findings, outcome.station),
         f"<section><h2>Before and after</h2><p class='muted'>Orange: recorded minus simulated as "
         f"described; bars are two standard errors. Blue: with the named physics.</p>{figures}"

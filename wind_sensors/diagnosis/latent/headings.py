@@ -22,6 +22,7 @@ from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.doubles import without_doubles
 from wind_sensors.station.model import Cup, Rotor, Station, Vane
 from wind_sensors.station.signals import Angles, Pulses, Recording, TimeArray
+from wind_sensors.station.silence import silent_instruments
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -102,8 +103,10 @@ def felt_by(recording: Recording) -> Felt:
     """
     recording = without_doubles(recording)
     station = recording.station
-    rotors = [i for i in station.instruments if isinstance(i, Rotor) and i.name in recording.pulses]
-    vanes = [i for i in station.instruments if isinstance(i, Vane) and i.name in recording.angles]
+    silent = {each.instrument for each in silent_instruments(recording, station)}
+    speaking = [i for i in station.instruments if i.name not in silent]
+    rotors = [i for i in speaking if isinstance(i, Rotor)]
+    vanes = [i for i in speaking if isinstance(i, Vane)]
     if station.platform is None or recording.platform is None or not rotors or not vanes:
         raise UserError(
             "without a reference wind a moving platform with a rotor and a vane is needed.",
