@@ -18,7 +18,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.vane_guesses import vane_guesses
-from wind_sensors.diagnosis.healthy.learning import learn
+from wind_sensors.diagnosis.healthy.learning import complete, learn
 from wind_sensors.diagnosis.json_output import as_json
 from wind_sensors.diagnosis.outcome import Outcome, outcome_json, with_silent
 from wind_sensors.diagnosis.proving.findings import Unexplained
@@ -113,7 +113,10 @@ def test_a_cup_that_says_nothing_is_told_beside_a_name() -> None:
 @pytest.mark.parametrize("dead", [without_vane, with_dead_vane])
 def test_no_baseline_is_learnt_from_what_says_nothing(dead: Callable[[], Recording]) -> None:
     with pytest.raises(UserError, match=r"'vane' has no readings.*not healthy"):
-        learn([recorded(STATION, 57), dead()])
+        learn([dead()])
+    # Beside recordings in which all speak it is left out.
+    whole = recorded(STATION, 57)
+    assert complete([whole, dead()]) == [whole]
 
 
 def test_other_diagnoses_tell_of_what_says_nothing() -> None:

@@ -12,7 +12,7 @@ from rich.progress import Progress
 
 from wind_sensors.diagnosis.comparing.reference_place import Place
 from wind_sensors.diagnosis.healthy.baseline import Baseline
-from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
+from wind_sensors.diagnosis.healthy.learning import complete, default_baseline, learn
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.reading import read_recording
@@ -56,9 +56,15 @@ def learnt(
         if station is None:
             raise UserError("no healthy recording is named.", "", "Name at least one.")
         return default_baseline(station)
+    kept = complete(recordings)
+    for recording in recordings:
+        if all(recording is not other for other in kept):
+            progress.console.print(
+                f"{recording.name} is left out: an instrument says nothing in it", highlight=False
+            )
     learning = progress.add_task("learning what is normal", total=1.0)
     return learn(
-        recordings,
+        kept,
         station,
         workers(),
         lambda share: progress.update(learning, completed=share),

@@ -54,8 +54,8 @@ def silent_instruments(recording: Recording, station: Station) -> tuple[Silent, 
     found = []
     for entry in station.instruments:
         if isinstance(entry, Rotor):
-            pulses = recording.pulses.get(entry.name)
-            if pulses is None or pulses.time.size == 0:
+            # A counter that stands still speaks; whether the rotor should turn the wind tells.
+            if entry.name not in recording.pulses:
                 found.append(Silent(entry.name, entry.pulses.topic, "pulses"))
         elif isinstance(entry, Angle) and not tells(recording.angles.get(entry.name)):
             topic = angle_inputs(entry)[entry.name].topic

@@ -286,20 +286,25 @@ def _commissioned(
     return current
 
 
-def _refuse_silence(recording: Recording) -> None:
-    """A recording in which an instrument says nothing is not healthy.
+def complete(recordings: Sequence[Recording]) -> list[Recording]:
+    """The recordings in which every instrument says something; the others are not healthy.
 
     Raises:
-        UserError: There is such an instrument.
+        UserError: There is none of which that is true.
     """
-    silent = silent_instruments(recording, recording.station)
-    if silent:
-        what = " and ".join(f"'{s.instrument}' has no {s.signal} on {s.topic}" for s in silent)
+    silent = {
+        k: silent_instruments(recording, recording.station)
+        for k, recording in enumerate(recordings)
+    }
+    kept = [recording for k, recording in enumerate(recordings) if not silent[k]]
+    if recordings and not kept:
+        what = " and ".join(f"'{s.instrument}' has no {s.signal} on {s.topic}" for s in silent[0])
         raise UserError(
             f"{what}: a recording in which an instrument says nothing is not healthy.",
-            recording.name,
-            "Look at its cable, its driver and the topic; leave this recording out.",
+            recordings[0].name,
+            "Look at its cable, its driver and the topic, or take it out of the station file.",
         )
+    return kept
 
 
 def learn(
@@ -316,11 +321,12 @@ def learn(
         workers: Processes.
         progress: Called with the share done.
 
+    Recordings in which an instrument says nothing are left out.
+
     Raises:
-        UserError: A recording cannot be compared, or an instrument says nothing in one.
+        UserError: A recording cannot be compared, or an instrument says nothing in any.
     """
-    for recording in recordings:
-        _refuse_silence(recording)
+    recordings = complete(recordings)
     if station is None:
         station = recordings[0].station
     baseline = default_baseline(station)
