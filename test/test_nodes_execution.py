@@ -62,6 +62,45 @@ def test_every_way_to_stop_it_ends_with_status_zero(node: str, tmp_path: Path) -
         assert "Traceback" not in errors
 
 
+_STOPPED_BEFORE_IT_PUBLISHES = """
+import os, signal, sys, time
+from wind_sensors.nodes.execution import run
+
+def build():
+    from rclpy.node import Node
+    from std_msgs.msg import Float64
+
+    node = Node("echo")
+    source = node.create_publisher(Float64, "source", 10)
+    echo = node.create_publisher(Float64, "echo", 10)
+
+    def receive(message):
+        for _ in range(2):
+            os.kill(os.getpid(), int(sys.argv[1]))
+        time.sleep(0.3)
+        echo.publish(message)
+        node.get_logger().info("published")
+
+    node.create_subscription(Float64, "source", receive, 10)
+    node.create_timer(0.002, lambda: source.publish(Float64()))
+    return [node]
+
+sys.exit(run(build, []))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_callback_that_a_stop_signal_meets_still_publishes(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    process = _run(_STOPPED_BEFORE_IT_PUBLISHES, tmp_path, str(int(number)))
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    assert (output + errors).count("published") == 1
+    for sign in ("FATAL", "Traceback", "Failed"):
+        assert sign not in errors
+
+
 _INTERRUPTED_CLASS = """
 import os, signal, sys
 from wind_sensors.nodes.execution import run

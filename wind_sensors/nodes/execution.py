@@ -40,8 +40,12 @@ class _Phase(Enum):
 class _StopSignals:
     """One handler for the whole life of the process.
 
-    It is installed before rclpy's, which calls it; installing another one later would replace
-    rclpy's. Hence a phase instead of several handlers.
+    rclpy installs none: its own would end the context under a callback that publishes, and the
+    executor prints what that leads to before anybody can catch it.
+
+    Attributes:
+        phase: What a signal means at present.
+        stopped: One has arrived; the running callback is the last one.
     """
 
     def __init__(self) -> None:
@@ -64,8 +68,8 @@ class _StopSignals:
     def report_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
         """What an exception leads to that nobody can catch: a stop signal, to nothing.
 
-        It may arrive within a destructor, where Python drops what is raised; rclpy has shut its
-        context down then, which ends the run as soon as the nodes are built.
+        It may arrive within a destructor, where Python drops what is raised; `stopped` ends the
+        run as soon as the nodes are built then.
         """
         if not issubclass(unraisable.exc_type, _Stopped):
             self._usual(unraisable)
@@ -87,11 +91,9 @@ class _StopSignals:
         if self.phase is _Phase.LOADING:
             # Nothing has been opened yet, so there is nothing to close.
             os._exit(0)
-        if self.phase is _Phase.BUILDING:
-            self.stopped = True
-            if not _is_reporting(frame):
-                raise _Stopped
-        # While running, rclpy has shut its context down and the spinning loop sees that.
+        self.stopped = True
+        if self.phase is _Phase.BUILDING and not _is_reporting(frame):
+            raise _Stopped
 
 
 _stop_signals = _StopSignals()
@@ -176,7 +178,8 @@ def run(
         for node in nodes:
             executor.add_node(node)
         _stop_signals.phase = _Phase.RUNNING
-        while rclpy.ok() and not (until is not None and until()):
+        while rclpy.ok() and not _stop_signals.stopped and not (until is not None and until()):
+            # A signal that finds nothing to do is answered when this returns.
             executor.spin_once(timeout_sec=_WAKE_UP_PERIOD)
     except (_Stopped, KeyboardInterrupt, ExternalShutdownException):
         pass
@@ -184,7 +187,7 @@ def run(
         raise UserError(f"{error}.", "parameters") from error
     except Exception as error:
         # What is raised while a class is being made, Python 3.11 hands on as an error of its own.
-        interrupted = _stop_signals.stopped
+        interrupted = _stop_signals.stopped and _stop_signals.phase is _Phase.BUILDING
         if not interrupted and (rclpy.ok() or not _is_consequence_of_shutdown(error)):
             raise
     finally:
@@ -201,9 +204,13 @@ def run(
 def _initialise(arguments: Sequence[str] | None) -> None:
     import rclpy
     from rclpy.impl.implementation_singleton import rclpy_implementation
+    from rclpy.signals import SignalHandlerOptions
 
     try:
-        rclpy.init(args=None if arguments is None else list(arguments))
+        rclpy.init(
+            args=None if arguments is None else list(arguments),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
     except (
         rclpy_implementation.RCLError,
         rclpy_implementation.RCLInvalidROSArgsError,
