@@ -138,3 +138,11 @@ def test_the_environment_of_other_wheels_is_not_inherited(
     assert "LD_LIBRARY_PATH" not in bootstrap.clean_environment()
     monkeypatch.delenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE")
     assert bootstrap.clean_environment()["LD_LIBRARY_PATH"] == "/elsewhere"
+
+
+def test_the_readme_names_the_python_versions_that_the_script_takes(bootstrap: Any) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    oldest, newest = (".".join(map(str, v)) for v in (bootstrap.OLDEST, bootstrap.WHEELS_UP_TO))
+    assert f"Python {oldest} to {newest}" in text
+    script = (ROOT / "scripts" / "bootstrap.py").read_text(encoding="utf-8")
+    assert f"CPython {oldest} to {newest}" in script
