@@ -162,6 +162,12 @@ def test_slot_errors_that_cannot_be_are_the_users_error(errors):
         edge_times(steadily_turning(rotor, seconds=1.0), "cup")
 
 
+@pytest.mark.parametrize("rate", [1e9, 1e30, np.nan])
+def test_edges_that_find_no_room_are_the_users_error(rate):
+    with pytest.raises(UserError, match="calibration_distance"):
+        edge_times(steadily_turning(cup(), rate, seconds=1.0), "cup")
+
+
 def test_a_rotor_that_turns_back_passes_its_slots_again():
     t = np.arange(0.0, 20.001, 0.05)
     psi, rate = 10.0 * np.sin(0.5 * t), 5.0 * np.cos(0.5 * t)

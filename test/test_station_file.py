@@ -15,6 +15,7 @@ from wind_sensors.recordings.station_files import (
     load_station,
     shipped_profiles,
 )
+from wind_sensors.simulation.run import recording_start
 from wind_sensors.station.inputs import resolved
 from wind_sensors.station.model import Cup, Input, Propeller, Station
 from wind_sensors.station.reading import read_station
@@ -58,6 +59,16 @@ def test_a_bare_topic_is_an_input_with_defaults() -> None:
         ("kind: cup|kind: cop", 2, "Did you mean 'cup'"),
         ("pulses_per_revolution: 4|pulses_per_revolution: four", 5, "whole number"),
         ("pulses: /cup/pulses|pulses: {topic: /a, fild: data}", 4, "`field`"),
+        ("pulses: /cup/pulses|pulses: cup pulses//", 4, "it has a space in it. Write letters"),
+        ("pulses: /cup/pulses|pulses: {topic: 7/cup}", 4, "pulses.topic: '7/cup' is not a ROS 2"),
+        ("calibration_distance: 0.14|calibration_distance: 1e-30", 6, "smaller than any"),
+        ("calibration_distance: 0.14|calibration_distance: 1.0e-8", 6, "Wind run per radian"),
+        ("distance_constant: 1.7|distance_constant: 0.0001", 7, "follows the wind"),
+        ("distance_constant: 1.7|distance_constant: 1.7\n  inertia_factor: 1e-9", 8, "smaller"),
+        ("distance_constant: 1.7|distance_constant: 1.7\n  calibration_gain: 1e9", 8, "larger"),
+        ("pulses_per_revolution: 4|pulses_per_revolution: 1000000000", 5, "larger than any"),
+        ("instruments:|recording: {start: yesterday}\ninstruments:", 1, "2026-01-01T00:00:00Z"),
+        ("instruments:|recording: {start: 2050-01-01}\ninstruments:", 1, "1901 to 2038"),
         ("distance_constant: 1.7|distance_constant: 1.7\n  profile: riso_cup", 8, "risoe_cup"),
         ("kind: cup|kind: cup\n  profile: fast_vane", 4, "profile of a vane"),
     ],
@@ -100,6 +111,25 @@ def test_keys_beside_a_profile_win() -> None:
     cup = read_station(text, "s", shipped_profiles()).instrument("c")
     assert isinstance(cup, Cup)
     assert (cup.calibration_distance, cup.distance_constant) == (0.2, 1.5)
+
+
+def test_a_change_is_held_to_the_same_limits() -> None:
+    text = CUP + "changes:\n- instrument: cup\n  set:\n    calibration_distance: 1e-30\n"
+    assert "station.yaml:11: changes[0].set.calibration_distance" in refusal(text)
+
+
+@pytest.mark.parametrize(
+    ("stated", "start"),
+    [
+        ("2026-01-01T00:00:00Z", 1_767_225_600_000_000_000),
+        ("2026-01-01T01:00:00.5+01:00", 1_767_225_600_500_000_000),
+        ("2026-01-01", 1_767_225_600_000_000_000),
+    ],
+)
+def test_the_start_is_a_date_a_time_or_both(stated: str, start: int) -> None:
+    for text in (stated, f'"{stated}"'):
+        station = read_station(f"recording: {{start: {text}}}\n{CUP}", "station.yaml", {})
+        assert recording_start(station) == start
 
 
 def test_changes_are_validated_like_the_entry_they_change() -> None:

@@ -48,12 +48,19 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.nodes import execution
     from wind_sensors.recordings import load_station
     from wind_sensors.recordings.writing import keep_inputs
+    from wind_sensors.station.topic_names import REMEDY, topic_name_fault
 
     if not (args.station or args.topics or args.all):
         raise UserError(
             "it is not said what to record.", remedy="Give --station FILE, --topics or --all."
         )
     keep_inputs(args.output, (args.station,))
+    for topic in args.topics or ():
+        fault = topic_name_fault(topic)
+        if fault:
+            raise UserError(
+                f"'{topic}' is not a ROS 2 topic name: it {fault}.", "--topics", REMEDY
+            )
     station = load_station(args.station) if args.station else None
     made: list[RecorderNode] = []
 

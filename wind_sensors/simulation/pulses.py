@@ -26,6 +26,9 @@ LONGEST_BOUNCE = 2.0
 CLOSE = 1e-6
 """A Newton step this small leaves an error of the order of its square, far below a nanosecond."""
 
+MOST_EDGES = 50_000_000
+"""Edges of one response, 0.8 GB of them: a rotor at a hundred a second for six days."""
+
 GENTLE = 0.03
 """A cubic whose slope changes by less than this share between its ends is within 1e-9 of its
 crossing after one step of third order (Halley's) from a straight line."""
@@ -187,6 +190,17 @@ def slot_angles(rotor: Rotor) -> FloatArray:
     return angles
 
 
+def _refuse_what_fills_the_memory(rotor: Rotor, psi: FloatArray) -> None:
+    """Raises UserError for a rotor that turns so often that its edges find no room."""
+    edges = float(np.abs(np.diff(psi)).sum()) * rotor.pulses_per_revolution / (2.0 * np.pi)
+    if not edges <= MOST_EDGES:
+        raise UserError(
+            f"'{rotor.name}' gives {edges:.2g} edges in one go, more than {MOST_EDGES:.2g}.",
+            f"instruments.{rotor.name}",
+            "Look at `calibration_distance` [m/rad], `pulses_per_revolution` and the wind.",
+        )
+
+
 class PulseCircuit:
     """Sensor, contact and logger of one rotor; keeps its state between responses.
 
@@ -259,6 +273,7 @@ class PulseCircuit:
             rotor = stretch.segment.station.instrument(self._name)
             assert isinstance(rotor, Rotor)
             here = slice(stretch.first * movement.nodes, stretch.last * movement.nodes + 1)
+            _refuse_what_fills_the_memory(rotor, movement.psi[here])
             times, numbers = _edges_of(
                 movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor),
                 drive.start_ns, stretch.first * drive.dt,

@@ -8,7 +8,6 @@ offline.
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime, timezone
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +26,7 @@ from wind_sensors.simulation.scenario import Scenario
 from wind_sensors.simulation.trajectories import Trajectory
 from wind_sensors.simulation.wind_field import MeasuredWind, TurbulentWind, WindSource
 from wind_sensors.station.model import Angle, Bivane, Rotor, Station
+from wind_sensors.station.moments import nanoseconds
 from wind_sensors.station.signals import (
     Angles,
     PlatformStates,
@@ -48,23 +48,9 @@ goes with the wind passes slowly and must still meet gusts of every size that it
 def recording_start(station: Station) -> int:
     """Start of the recording that the station file states [ns since 1970].
 
-    Raises:
-        UserError: It is not a date and time.
+    The station's validation lets nothing else through than a moment.
     """
-    text = station.recording.start
-    try:
-        moment = datetime.fromisoformat(text.replace("Z", "+00:00"))
-    except ValueError as problem:
-        raise UserError(
-            f"'{text}' is not a date and time.",
-            "recording.start",
-            "Write it like 2026-01-01T00:00:00Z.",
-        ) from problem
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=timezone.utc)
-    since = moment - datetime(1970, 1, 1, tzinfo=timezone.utc)
-    whole = (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
-    return whole * 1_000
+    return nanoseconds(station.recording.start)
 
 
 class SignalStream:

@@ -81,8 +81,11 @@ def _plain(node: Any, path: Path, lines: dict[Path, int]) -> Any:
     if isinstance(node, float):
         return float(node)
     if isinstance(node, datetime.datetime):
-        text = node.replace(tzinfo=None).isoformat()
-        return f"{text}Z"
+        ahead = node.utcoffset() or datetime.timedelta()
+        moment = datetime.datetime(
+            node.year, node.month, node.day, node.hour, node.minute, node.second, node.microsecond
+        )
+        return f"{(moment - ahead).isoformat()}Z"
     if isinstance(node, datetime.date):
         return node.isoformat()
     return str(node)

@@ -11,7 +11,10 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from wind_sensors.station import moments, topic_names
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -20,6 +23,11 @@ Vector3 = tuple[float, float, float]
 
 STANDARD_DENSITY = 1.225
 """Air density of a calibration, and of air of which nothing is known [kg/m^3]."""
+
+
+def _told(what: str, remedy: str) -> PydanticCustomError:
+    """A fault of a value with its own remedy, for the validators."""
+    return PydanticCustomError("told", "{what}", {"what": what, "remedy": remedy})
 
 
 class Entry(BaseModel):
@@ -54,6 +62,14 @@ class Input(Entry):
     """Value of the field at which a running count or angle wraps to zero."""
     steps: tuple[tuple[float, float], ...] = ()
     """Pairs (raw value, angle in degrees) of a stepped vane."""
+
+    @field_validator("topic")
+    @classmethod
+    def _is_a_name(cls, topic: str) -> str:
+        fault = topic_names.topic_name_fault(topic)
+        if fault:
+            raise _told(f"'{topic}' is not a ROS 2 topic name: it {fault}", topic_names.REMEDY)
+        return topic
 
 
 class WakeShadow(Entry):
@@ -455,6 +471,15 @@ class RecordingInfo(Entry):
     """Of the sensors above ground [m]."""
     roughness_length: Positive = 0.03
     """Of the ground upwind [m]."""
+
+    @field_validator("start")
+    @classmethod
+    def _is_a_moment(cls, start: str) -> str:
+        try:
+            moments.nanoseconds(start)
+        except ValueError as fault:
+            raise _told(str(fault), moments.REMEDY) from None
+        return start
 
 
 class Station(Entry):

@@ -39,6 +39,7 @@ class Ceiling(NamedTuple):
     hint: str
 
 
+_SPEED = "Speeds are in m/s."
 _LENGTH = "Lengths are in metres; this looks like millimetres or centimetres."
 CEILINGS: dict[str, Ceiling] = {
     "calibration_distance": Ceiling(5.0, f"Wind run per radian. {_LENGTH}"),
@@ -55,6 +56,33 @@ CEILINGS: dict[str, Ceiling] = {
     "bounce_delay": Ceiling(1.0, "Times are in seconds; this looks like milliseconds."),
     "latency": Ceiling(60.0, "Times are in seconds; this looks like milliseconds."),
     "filter_time_constant": Ceiling(60.0, "Times are in seconds; this looks like milliseconds."),
+    "pulses_per_revolution": Ceiling(10_000.0, "It counts the edges of one turn."),
+    "calibration_gain": Ceiling(20.0, "The gain is 1 for the calibration's own rate."),
+    "calibration_offset": Ceiling(50.0, _SPEED),
+    "torque_harmonic": Ceiling(20.0, "It is a share of the dynamic pressure's torque."),
+    "damping_factor": Ceiling(100.0, "The factor is 1 for the healthy vane."),
+}
+
+
+class Floor(NamedTuple):
+    """The smallest value that can be meant, and what it is about."""
+
+    value: float
+    hint: str
+
+
+# The simulator's pulses and steps go with the inverse of these: what no instrument has would fill
+# the memory or never end.
+_TINY = "Lengths are in metres; no instrument follows the wind within so little of it."
+FLOORS: dict[str, Floor] = {
+    "calibration_distance": Floor(0.002, f"Wind run per radian. {_TINY}"),
+    "distance_constant": Floor(0.01, _TINY),
+    "arm_radius": Floor(0.002, "Lengths are in metres."),
+    "measuring_height": Floor(0.01, "Lengths are in metres."),
+    "inertia_factor": Floor(0.02, "The factor is 1 for the healthy instrument."),
+    "damping_ratio": Floor(0.001, "The ratio is 1 at critical damping."),
+    "reference_density": Floor(0.05, "Densities are in kg/m^3, about 1.2 near the ground."),
+    "calibration_gain": Floor(0.01, "The gain is 1 for the calibration's own rate."),
 }
 
 
@@ -72,18 +100,22 @@ def problem_of(error: ErrorDetails, document: Document, given: Any) -> Problem:
 
 
 def implausible(document: Document, data: Any, path: Path = ()) -> list[Problem]:
-    """Values that are allowed by the schema but in the wrong unit by all appearance."""
+    """Values that the schema allows but that no instrument has: in the wrong unit, or mistyped."""
     found: list[Problem] = []
     items = enumerate(data) if isinstance(data, list) else data.items()
     for step, value in items:
         here: Path = (*path, step)
         if isinstance(value, (dict, list)):
             found += implausible(document, value, here)
-        elif isinstance(value, (int, float)) and step in CEILINGS:
-            ceiling = CEILINGS[step]
-            if abs(value) > ceiling.value:
+        elif isinstance(value, (int, float)):
+            ceiling, floor = CEILINGS.get(str(step)), FLOORS.get(str(step))
+            if ceiling is not None and abs(value) > ceiling.value:
                 what = f"{value:g} is larger than any instrument's ({ceiling.value:g})."
                 found.append(Problem(document.where(here), here, what, ceiling.hint))
+            elif floor is not None and 0.0 < value < floor.value:
+                # Zero and less are the schema's to refuse.
+                what = f"{value:g} is smaller than any instrument's ({floor.value:g})."
+                found.append(Problem(document.where(here), here, what, floor.hint))
     return found
 
 
@@ -140,6 +172,8 @@ def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:
         return f"'{given}' stands where a group of keys belongs.", about
     if kind in {"tuple_type", "list_type"}:
         return f"'{given}' stands where a list belongs.", about
+    if kind == "told":
+        return f"{context['what']}.", str(context["remedy"])
     if kind == "value_error":
         return f"{error['msg'].removeprefix('Value error, ')}.", ""
     return f"{error['msg']}.", about
