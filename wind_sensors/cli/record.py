@@ -54,13 +54,13 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(
             "it is not said what to record.", remedy="Give --station FILE, --topics or --all."
         )
-    keep_inputs(args.output, (args.station,))
     for topic in args.topics or ():
         fault = topic_name_fault(topic)
         if fault:
             raise UserError(
                 f"'{topic}' is not a ROS 2 topic name: it {fault}.", "--topics", REMEDY
             )
+    keep_inputs(args.output, (args.station,))
     station = load_station(args.station) if args.station else None
     made: list[RecorderNode] = []
 
