@@ -137,7 +137,7 @@ def test_the_page_gives_the_evidence_for_a_name() -> None:
     assert (
         "The mismatch is largest <b>at 0.08 to 0.14 Hz</b> (cup, rotor rate): the residual "
         "scatters by 0.485 m/s in all, p = 0.078 after looking everywhere. The effect removes "
-        "50 % of the whole misfit and lowers minus twice the log-likelihood by 88.1: that names it"
+        "50 % of the whole misfit and lowers minus twice the log-likelihood by 88: that names it"
     ) in text
     assert finding_json(small, 400.0)["gain"] == 88.12
     assert finding_json(replace(small, gain=0.0), 400.0)["gain"] is None

@@ -174,7 +174,7 @@ def _gain(finding: Finding) -> str:
     """The evidence for the name beyond the place where the mismatch is largest."""
     if finding.gain <= 0.0:
         return ""
-    text = f" and lowers minus twice the log-likelihood by {number_text(finding.gain)}"
+    text = f" and lowers minus twice the log-likelihood by {finding.gain:.0f}"
     if finding.p > REMAINDER_P:
         text += ": that names it, for no single region stands out by itself"
     return text
