@@ -268,8 +268,8 @@ def test_a_simulation_fits_the_memory(
         (("monte-carlo", "--seed", "-1"), "--seed: The seed must not be negative. Use"),
         (("figures", "k94-99", "-o", "{tmp}"), "there is no figure 'k94-99'. Known: "),
         (("figures", "k94-2", "-o", "{tmp}/file"), "file: this is a file, not a folder. Choose"),
-        (("figures", "k94-2", "-o", "{tmp}/file/x"), "x: this cannot be written (Not a dir"),
-        (("plot", "{r}", "-o", "{tmp}/file/x"), "x: this cannot be written (Not a dir"),
+        (("figures", "k94-2", "-o", "{tmp}/file/x"), "x: the result cannot be written (Not a dir"),
+        (("plot", "{r}", "-o", "{tmp}/file/x"), "x: the result cannot be written (Not a dir"),
         (
             ("process", "{r}", "-o", "{tmp}/new", "--output-rate", "0"),
             "--output-rate: 0 is out of range. Give a value from 0.1 to 200.",
@@ -292,7 +292,7 @@ def test_a_table_that_cannot_be_written_is_no_traceback(
     monkeypatch.setattr(monte_carlo, "run_monte_carlo", lambda *_, **__: [])
     (tmp_path / "file").write_text("no folder")
     assert main(["monte-carlo", "-o", str(tmp_path / "file" / "table.md")]) == 2
-    assert "table.md: this cannot be written (" in capsys.readouterr().err
+    assert "table.md: the result cannot be written (" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
