@@ -21,9 +21,6 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 FloatArray = npt.NDArray[np.float64]
 
 
-EQUAL_LIKELIHOOD = 3.0
-"""Explanations whose log-likelihoods lie closer are reported together."""
-
 EQUAL_SHARE = 0.03
 """Explanations that differ by less than this share of the gain are equal: the simulation is not
 exact enough to tell them apart."""

@@ -17,7 +17,6 @@ from wind_sensors.diagnosis.explaining.acceptance import (
 )
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
-    EQUAL_LIKELIHOOD,
     EQUAL_SHARE,
     Judged,
     evidence,
@@ -39,6 +38,9 @@ if it brings less by no more than this."""
 
 NEARLY_AS_WELL_BESIDE = 25.0
 """The same beside another effect, whose own form may err in a part of the record."""
+
+AS_MUCH = 6.0
+"""Of explanations that bring less by no more than this, the region that stands out decides."""
 
 EXPLAINED = 0.5
 """Share of the region's score below which what is left is no more than its noise."""
@@ -107,7 +109,7 @@ def explaining_what_stands_out(
     whitener: Whitener,
     current: Fit,
     enough: list[tuple[float, Judged]],
-    near: float = 2.0 * EQUAL_LIKELIHOOD,
+    near: float = AS_MUCH,
 ) -> list[tuple[float, Judged]]:
     """Of explanations that bring as much as the best, those of the region that stands out.
 

@@ -44,6 +44,13 @@ DELAYS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """In each part of the record a delay is tried so many times as long. Where it is wrong by half a
 second its signature says nothing: quick eddies are out of step."""
 
+DELAY_GROWS = 6.0
+"""Delays that grow steadily are tried as a whole, not by their signature: a constant one would be
+the worse for it, so that less speaks against it."""
+
+GROWTHS = (-1.0, -0.5, 0.5, 1.0)
+"""By so much of itself a delay grows from the middle of the record to its end."""
+
 AT_A_JUMP = 2.0
 """Where a clock's stamps jump, so many seconds say nothing: pulses on either side share a bin."""
 
@@ -77,7 +84,7 @@ size that grows or shrinks with the speed must not drop the cost by more than th
 this share of the gain; the last where the form is certain. A fin that gives way is taken for a
 heavy vane otherwise, a cable that pulls for a disc off centre."""
 
-DISCORD = 20.0
+DISCORD = 10.0
 DISCORD_SHARE = 0.02
 """An effect that reaches several signals has one size on all of them: one of its own on each must
 not drop the cost by more than this, or than this share of the gain. A heavier rotor slows its own
@@ -174,7 +181,9 @@ def varies(naming: Naming, station: Station) -> bool:
         large = share
         if term.effect.entrance == "clock":
             large = CLOCK_VARIES_SHARE * naming.gain
-            if drop_by_own_delays(naming, station, term) > max(VARIES, large):
+            own, steady = drop_by_own_delays(naming, station, term)
+            most_steadily = max(DELAY_GROWS, GROWS_SHARE * naming.gain)
+            if own > max(VARIES, large) or steady > most_steadily:
                 return True
             begin, end = begin + AT_A_JUMP, end - AT_A_JUMP
         cuts = np.linspace(begin, end, PARTS + 1)
@@ -190,7 +199,7 @@ def varies(naming: Naming, station: Station) -> bool:
     return False
 
 
-def drop_by_own_delays(naming: Naming, station: Station, term: Term) -> float:
+def drop_by_own_delays(naming: Naming, station: Station, term: Term) -> tuple[float, float]:
     """Drop of the cost if each part of the record had a delay of its own, nought among them.
 
     Also where it is said not to hold: a clock that drifts is a delay that begins in the middle.
@@ -199,16 +208,32 @@ def drop_by_own_delays(naming: Naming, station: Station, term: Term) -> float:
         naming: The explanation.
         station: As commissioned.
         term: A delay, one of its effects.
+
+    Returns:
+        With any delays, and with delays that grow or shrink steadily through the record.
     """
     comparison = naming.adequate.comparison
+    times = [1.0]
     costs = [_costs_in_parts(naming, naming.fit.simulated)]
-    for times in DELAYS:
-        other = replace(term, values=term.effect.scaled(term.values, times), interval=ALWAYS)
+    for longer in DELAYS:
+        other = replace(term, values=term.effect.scaled(term.values, longer), interval=ALWAYS)
         terms = [other if t is term else t for t in naming.fit.terms]
         simulated = comparison.possible(planted(station, terms))
         if simulated is not None:
+            times.append(longer)
             costs.append(_costs_in_parts(naming, simulated))
-    return float(np.sum(costs[0] - np.min(costs, axis=0)))
+    whole = np.asarray(costs)
+    each = float(np.sum(whole[0] - np.min(whole, axis=0)))
+    order = np.argsort(times[1:])
+    tried, table = np.asarray(times[1:])[order], whole[1:][order]
+    if tried.size < 2:
+        return each, 0.0
+    middles = 2.0 * (np.arange(PARTS) + 0.5) / PARTS - 1.0
+    growing = [
+        sum(np.interp(1.0 + growth * x, tried, table[:, k]) for k, x in enumerate(middles))
+        for growth in GROWTHS
+    ]
+    return each, float(np.sum(whole[0]) - min(growing))
 
 
 def _costs_in_parts(naming: Naming, simulated: Simulated) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.detectable import smallest_detectable
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.healthy.baseline import Baseline
@@ -223,7 +223,7 @@ def _upheld(
     """
     if not findings:
         return verdict, (), ""
-    names = " and ".join(t.effect.name for t in naming.fit.terms)
+    names = " and ".join(_names(naming.fit.terms))
     passing = any(t.interval != ALWAYS for t in naming.fit.terms)
     something = structured or not passing or naming.gain > UNSEEN_NOISY_GAIN
     left: Verdict = "unknown" if something else "none"
@@ -252,6 +252,15 @@ def _upheld(
     else:
         return verdict, findings, ""
     return left, (), f"{names} would fit, but {objection}"
+
+
+def _names(terms: Sequence[Term]) -> list[str]:
+    """Names of effects, with their instruments where one effect stands for two."""
+    names = [term.effect.name for term in terms]
+    return [
+        f"{name} ({term.instrument})" if names.count(name) > 1 else name
+        for name, term in zip(names, terms, strict=True)
+    ]
 
 
 def _structured(found: list[Found]) -> list[Found]:
