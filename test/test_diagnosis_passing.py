@@ -186,7 +186,8 @@ def test_noise_is_judged_outside_a_wake(searcher: Searcher) -> None:
     [
         ("calibration_offset", {"offset": 0.2}, 1, 20.0, True),
         ("calibration_offset", {"offset": 0.2}, 2, 20.0, False),
-        ("calibration_offset", {"offset": 0.2}, 2, 4.0, True),
+        ("calibration_offset", {"offset": 0.2}, 2, 13.0, False),
+        ("calibration_offset", {"offset": 0.2}, 2, 11.0, True),
         ("damaged_cup", {"torque_harmonic": 0.0, "gain": 1.03}, 2, 1.0, False),
         ("damaged_cup", {"torque_harmonic": 0.0, "gain": 1.03}, 2, -1.0, True),
     ],
