@@ -207,6 +207,22 @@ def test_a_rival_with_more_parameters_has_to_fit_as_well(
     assert [a.fit.terms[0].effect.name for _, a in found] == ([effect] if equal else [])
 
 
+@pytest.mark.parametrize(("cosine", "equal"), [(0.5, True), (0.3, False)])
+def test_what_fits_as_well_is_a_rival_if_it_is_half_alike(
+    searcher: Searcher, cosine: float, equal: bool
+) -> None:
+    drifted = named(searcher, drift())
+    own = drifted.nothing - drifted.fit.vector
+    across = np.roll(own, 7)
+    across -= own * float(across @ own) / float(own @ own)
+    across *= np.linalg.norm(own) / np.linalg.norm(across)
+    correction = cosine * own + np.sqrt(1.0 - cosine**2) * across
+    terms = (Term(catalogue()["calibration_offset"], "cup", {"offset": 0.2}),)
+    rival = replace(drifted.fit, terms=terms, vector=drifted.nothing - correction)
+    found = equal_explanations(replace(drifted, alternatives=(Alternative(rival, 4.0),)))
+    assert bool(found) is equal
+
+
 @pytest.mark.parametrize(("gain", "equal"), [(400.0, True), (33.0, True), (31.0, False)])
 def test_what_passes_and_would_not_be_named_is_no_rival(
     searcher: Searcher, gain: float, equal: bool
