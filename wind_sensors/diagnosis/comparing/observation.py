@@ -116,7 +116,7 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
         turns /= rotor.pulses_per_revolution
     if np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
-        time, turns = time[order], np.sort(turns)
+        time, turns = time[order], np.sort(turns, kind="stable")
     slots = min(rotor.pulses_per_revolution, time.size - 1)
     at = _turns_at(grid.edges, time, turns, slots)
     return np.asarray(

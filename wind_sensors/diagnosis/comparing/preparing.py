@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.comparing.observation import (
 )
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
+from wind_sensors.diagnosis.comparing.spectra import quick_length
 from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import drive_from_recording
@@ -42,6 +43,9 @@ SPEED_TIME = 10.0
 
 MOST_REPEATED = 0.8
 """With more of the reference's samples repeated, too little is known of the wind."""
+
+ROUNDING = 1e-6
+"""A last bin that lacks less than this share is whole."""
 
 HARDLY_TURNS = 0.4
 """Below this share of the rate that it should have, a rotor's eddies say nothing."""
@@ -75,14 +79,15 @@ def prepare(
             "Its heads are wet or iced, or its driver fills gaps; compare another recording.",
         )
     drive = drive_from_recording(recording)
-    seconds = (len(drive) - 1) * drive.dt
+    seconds = len(drive) * drive.dt
     if seconds < SHORTEST:
         raise UserError(
             f"Only {seconds:.0f} s of reference wind: too little to compare anything.",
             recording.name,
             f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
         )
-    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
+    number = quick_length(int(seconds / SERIES_INTERVAL + ROUNDING))
+    grid = Grid(drive.start_ns, SERIES_INTERVAL, number)
     channels = tuple(
         c
         for c in channels_of(known)
