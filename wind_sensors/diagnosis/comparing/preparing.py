@@ -44,9 +44,6 @@ SPEED_TIME = 10.0
 MOST_REPEATED = 0.8
 """With more of the reference's samples repeated, too little is known of the wind."""
 
-ROUNDING = 1e-6
-"""A last bin that lacks less than this share is whole."""
-
 HARDLY_TURNS = 0.4
 """Below this share of the rate that it should have, a rotor's eddies say nothing."""
 
@@ -79,14 +76,14 @@ def prepare(
             "Its heads are wet or iced, or its driver fills gaps; compare another recording.",
         )
     drive = drive_from_recording(recording)
-    seconds = len(drive) * drive.dt
+    seconds = (len(drive) - 1) * drive.dt
     if seconds < SHORTEST:
         raise UserError(
             f"Only {seconds:.0f} s of reference wind: too little to compare anything.",
             recording.name,
             f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
         )
-    number = quick_length(int(seconds / SERIES_INTERVAL + ROUNDING))
+    number = quick_length(int(seconds / SERIES_INTERVAL))
     grid = Grid(drive.start_ns, SERIES_INTERVAL, number)
     channels = tuple(
         c
