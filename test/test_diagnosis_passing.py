@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +32,7 @@ from wind_sensors.diagnosis.explaining.naming import kept_if_better, name, named
 from wind_sensors.diagnosis.explaining.onsets import in_a_part
 from wind_sensors.diagnosis.explaining.rounds import blind_starts, first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving import findings
 from wind_sensors.diagnosis.proving.decision import (
     REMAINDER_SCORE,
@@ -292,10 +294,12 @@ def test_the_same_effect_at_other_times_is_no_other_explanation(
     nothing = null.of(searcher.bank.without)
     alternatives = (Alternative(later, 2.0), Alternative(other, 40.0))
     naming = Naming(found, null, null, nothing, 50.0, alternatives)
-    placebos: list[tuple[Term, ...]] = []
+    placebos: list[Sequence[Term]] = []
 
-    def kept(*arguments: object) -> None:
-        placebos.append(arguments[-1])  # type: ignore[arg-type]
+    def kept(
+        whitener: Whitener, station: Station, terms: Sequence[Term], placebo: Sequence[Term]
+    ) -> None:
+        placebos.append(placebo)
 
     monkeypatch.setattr(findings, "prove", kept)
     bank = region_bank(null, searcher.bank.without)

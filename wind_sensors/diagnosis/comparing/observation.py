@@ -115,6 +115,7 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
         turns = np.arange(time.size, dtype=np.float64)
         turns /= rotor.pulses_per_revolution
     if np.any(time[1:] < time[:-1]):
+        # Only few are out of order: stable sorts are quick then, the usual one is not.
         order = np.argsort(time, kind="stable")
         time, turns = time[order], np.sort(turns, kind="stable")
     slots = min(rotor.pulses_per_revolution, time.size - 1)
