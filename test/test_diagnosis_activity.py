@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from diagnosis_cases import STATION, baseline, recorded
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing import activity
 from wind_sensors.diagnosis.comparing.observation import Channel, Grid

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_diagnosis_naming import STATION, baseline, recorded
+from diagnosis_cases import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, channels_of

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_cases import STATION, baseline, recorded
 from scipy.ndimage import uniform_filter1d
-from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue

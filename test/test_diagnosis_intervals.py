@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from diagnosis_cases import STATION, baseline, recorded
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
+from diagnosis_cases import STATION, recorded
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_diagnosis_naming import STATION, recorded
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.preparing import prepare

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_diagnosis_naming import STATION, recorded
+from diagnosis_cases import STATION, recorded
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_cases import STATION, baseline, recorded
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from representatives import represented
 from scipy.signal import lfilter
-from test_diagnosis_naming import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.observation import Grid, rate_series
 from wind_sensors.diagnosis.comparing.observing import BANDS

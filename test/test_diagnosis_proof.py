@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from test_diagnosis_naming import STATION, baseline, recorded
+from diagnosis_cases import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue

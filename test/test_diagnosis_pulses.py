@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from test_diagnosis_naming import STATION, baseline, recorded
+from diagnosis_cases import STATION, baseline, recorded
 
 from wind_sensors.diagnosis.comparing.observation import Grid
 from wind_sensors.diagnosis.comparing.observing import BANDS

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 import pytest
+from diagnosis_cases import STATION, recorded
 from hypothesis import given
 from hypothesis import strategies as st
-from test_diagnosis_naming import STATION, recorded
 
 from wind_sensors.cli.baseline import told_place
 from wind_sensors.diagnosis.comparing.comparison import Comparison

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_diagnosis_naming import STATION, baseline, recorded
+from diagnosis_cases import STATION, baseline, recorded
 
 from wind_sensors.cli.main import main
 from wind_sensors.diagnosis.comparing.preparing import prepare

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_diagnosis_naming import STATION, baseline, diagnosed, recorded
+from diagnosis_cases import STATION, baseline, diagnosed, recorded
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue

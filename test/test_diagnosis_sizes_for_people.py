@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_cases import STATION
 from hypothesis import given
 from hypothesis import strategies as st
-from test_diagnosis_naming import STATION
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.fitting import Term
