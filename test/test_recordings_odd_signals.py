@@ -174,11 +174,6 @@ def test_impossible_winds_are_left_out_and_noted(tmp_path: Path) -> None:
     assert "/w: 2 of 2000 winds are faster than 150 m/s and were left out" in after.notes
 
 
-@pytest.fixture
-def small(tmp_path: Path) -> Path:
-    return write_recording(tmp_path / "small", full_recording(np.random.default_rng(2)))
-
-
 def set_back_at(times: np.ndarray, index: int, by: int) -> np.ndarray:
     """Times of a clock that is set back before the index-th message."""
     return times - by * (np.arange(len(times)) >= index)
@@ -211,18 +206,21 @@ def test_a_clock_that_is_set_back_mixes_nothing(
     assert "recorder" in after.notes[0] and after.notes[1].startswith("/v: ")
 
 
-def test_topics_that_were_written_one_after_the_other_are_no_clock_set_back(small: Path) -> None:
-    before = read_recording(small)
-    with Reader(small / "bag") as reader:
+def test_topics_that_were_written_one_after_the_other_are_no_clock_set_back(
+    tmp_path: Path,
+) -> None:
+    folder = write_recording(tmp_path / "r", full_recording(np.random.default_rng(2)))
+    before = read_recording(folder)
+    with Reader(folder / "bag") as reader:
         messages = [(c.topic, c.msgtype, time, raw) for c, time, raw in reader.messages()]
-    shutil.rmtree(small / "bag")
-    with Writer(small / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    shutil.rmtree(folder / "bag")
+    with Writer(folder / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         made = {}
         for topic, kind, time, raw in sorted(messages, key=lambda message: message[0]):
             if topic not in made:
                 made[topic] = writer.add_connection(topic, kind, typestore=TYPES)
             writer.write(made[topic], time, raw)
-    after = read_recording(small)
+    after = read_recording(folder)
     assert after.notes == before.notes
     assert np.array_equal(after.pulses["cup"].time, before.pulses["cup"].time)
 
