@@ -86,7 +86,7 @@ def test_a_counter_that_loses_what_follows_too_soon_for_a_while(
     interval: tuple[float, float | None],
 ) -> None:
     effect = catalogue()["missed_pulses"]
-    dead = {"dead_time": 0.013, "loss_probability": 0.0}
+    dead = {"dead_time": 0.013, "loss_probability": 0.0, "loss_growth": 0.0}
     station = with_effect(STATION, effect, "cup", dead, interval)
     found = diagnose(recorded(station, 53), baseline())
     assert [f.term.key for f in found.findings] == [("missed_pulses", "cup")]

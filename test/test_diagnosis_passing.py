@@ -114,7 +114,8 @@ def test_where_another_effect_passes_one_that_the_screening_hardly_sees_is_tried
         "vane",
         {"centre": 40.0, "width": 10.0, "reading": 35.0},
     )
-    rotor = Term(catalogue()["missed_pulses"], "cup", {"dead_time": 0.01, "loss_probability": 0.0})
+    dead = {"dead_time": 0.01, "loss_probability": 0.0, "loss_growth": 0.0}
+    rotor = Term(catalogue()["missed_pulses"], "cup", dead)
     guesses = {(t.effect.name, t.instrument): (t,) for t in (gap, rotor)}
     guessing = replace(searcher, guesses=guesses)
     eccentric = Term(

@@ -120,7 +120,7 @@ def test_the_beginning_of_uneven_slots_is_part_of_the_finding() -> None:
     assert finding.parameters["scatter"].value == pytest.approx(0.04, rel=0.2)
 
 
-DEAD = {"dead_time": 0.0075, "loss_probability": 0.0}
+DEAD = {"dead_time": 0.0075, "loss_probability": 0.0, "loss_growth": 0.0}
 
 
 def test_a_dead_time_is_read_off_beside_another_gain() -> None:
@@ -130,6 +130,17 @@ def test_a_dead_time_is_read_off_beside_another_gain() -> None:
     named = {f.term.effect.name: f.term.values for f in found.findings}
     assert named["missed_pulses"]["dead_time"] == pytest.approx(0.0075, rel=0.01)
     assert named["calibration_drift"]["gain"] == pytest.approx(1.05, abs=0.015)
+
+
+@pytest.mark.parametrize("growth", [0.0, 2.0])
+def test_losses_that_grow_with_the_rate_are_told_from_those_that_do_not(growth: float) -> None:
+    values = {"dead_time": 0.0, "loss_probability": 0.05, "loss_growth": growth}
+    station = with_effect(STATION, catalogue()["missed_pulses"], "cup", values)
+    (finding,) = diagnose(recorded(station, 87), baseline()).findings
+    assert finding.term.effect.name == "missed_pulses"
+    assert finding.term.values["loss_growth"] == pytest.approx(growth, abs=0.6)
+    assert finding.term.values["loss_probability"] == pytest.approx(0.05, rel=0.25)
+    assert finding.proof is not None and finding.proof.excess_removed > 0.8
 
 
 @pytest.mark.parametrize(
@@ -240,7 +251,7 @@ def test_a_counter_that_is_deaf_throughout_is_not_said_to_become_so(
     [
         ("bearing_friction", {"friction_speed": 2.5, "temperature_coefficient": 0.0}),
         ("stuck_sensor", {"start": 100.0, "stop": 200.0, "reading": 0.0, "known": 0.0}),
-        ("missed_pulses", {"dead_time": 0.0, "loss_probability": 0.9}),
+        ("missed_pulses", {"dead_time": 0.0, "loss_probability": 0.9, "loss_growth": 0.0}),
     ],
 )
 def test_pulses_that_come_soon_or_not_at_all_were_not_lost_one_by_one(
@@ -250,8 +261,8 @@ def test_pulses_that_come_soon_or_not_at_all_were_not_lost_one_by_one(
     comparison = prepare(recorded(station, 82))
     lost = catalogue()["missed_pulses"]
     usual = float(np.median(np.diff(comparison.recording.pulses["cup"].time))) * 1e-9
-    deaf = Term(lost, "cup", {"dead_time": 1.5 * usual, "loss_probability": 0.0})
-    seldom = Term(lost, "cup", {"dead_time": 0.0, "loss_probability": 0.9})
+    deaf = Term(lost, "cup", {**DEAD, "dead_time": 1.5 * usual})
+    seldom = Term(lost, "cup", {"dead_time": 0.0, "loss_probability": 0.9, "loss_growth": 0.0})
     silent = effect == "stuck_sensor"
     assert ruled_out(comparison, STATION, [deaf])
     assert ruled_out(comparison, STATION, [seldom]) is silent

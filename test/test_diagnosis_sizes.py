@@ -396,7 +396,7 @@ def test_what_a_recording_does_not_ask_for_is_left_as_stated(
 
 
 def test_a_dead_time_is_reported_without_losses_that_nobody_sees() -> None:
-    dead = {"dead_time": 0.0075, "loss_probability": 0.0}
+    dead = {"dead_time": 0.0075, "loss_probability": 0.0, "loss_growth": 0.0}
     station = with_effect(STATION, catalogue()["missed_pulses"], "cup", dead)
     (finding,) = diagnose(recorded(station, 82), baseline(), with_proof=False).findings
     assert set(finding.parameters) == {"dead_time"}

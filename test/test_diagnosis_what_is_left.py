@@ -138,7 +138,7 @@ def test_which_pulse_of_a_turn_a_dead_time_takes_is_not_held_against_it(
     searcher: Searcher, effect: str, label: str, times: float
 ) -> None:
     assert label in STATISTICS["rotor_rate"]
-    values = {"dead_time": 0.02, "loss_probability": 0.1, "gain": 1.1}
+    values = {"dead_time": 0.02, "loss_probability": 0.1, "loss_growth": 0.0, "gain": 1.1}
     naming = named(searcher, Term(catalogue()[effect], "cup", values))
     region = Region(searcher.comparison.channels[0].name, "statistic", 0.0, 1.0, label)
     loud = _Loud((region,), np.zeros((0, 0)), (), (), np.zeros(0))

@@ -37,6 +37,9 @@ MAST: dict[str, Case] = {
     "torque once a turn": Case(cup={"torque_harmonic": 0.1}),
     "dead time": Case(cup={"electronics": {"dead_time": 0.035}}, speed=0.3),
     "lost pulses": Case(cup={"electronics": {"loss_probability": 0.15}}),
+    "pulses lost as it races": Case(
+        cup={"electronics": {"loss_probability": 0.08, "loss_growth": 2.0}}
+    ),
     "bounces": Case(cup={"electronics": {"bounce_probability": 0.2, "bounce_delay": 0.004}}),
     "late pulses": Case(cup={"clock": {"latency": 0.6}}, rms=1.5),
     "early pulses": Case(cup={"clock": {"latency": -3.0}}, rms=1.5),

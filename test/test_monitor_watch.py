@@ -36,7 +36,7 @@ PLANTED = {
     "vane_friction": ("vane", {"friction_speed": 1.5}),
     "timestamp_latency": ("vane", {"latency": 0.45}),
     "low_pass_filter": ("vane", {"time_constant": 0.3}),
-    "missed_pulses": ("cup", {"dead_time": 0.0, "loss_probability": 0.03}),
+    "missed_pulses": ("cup", {"dead_time": 0.0, "loss_probability": 0.03, "loss_growth": 0.0}),
     "extra_pulses": ("cup", {"bounce_probability": 0.03, "bounce_delay": 0.003}),
     "bearing_friction": ("cup", {"friction_speed": 1.5}),
 }
@@ -105,7 +105,7 @@ def test_a_vane_that_sticks_is_told_by_its_readings() -> None:
 
 
 def test_lost_pulses_are_found_without_any_reference() -> None:
-    values = {"dead_time": 0.0, "loss_probability": 0.05}
+    values = {"dead_time": 0.0, "loss_probability": 0.05, "loss_growth": 0.0}
     effect = catalogue()["missed_pulses"]
     planted = with_effect(station(), effect, "cup", values, (BEGINNING, None))
     without = replace(recorded(planted), reference=None)

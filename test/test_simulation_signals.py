@@ -201,6 +201,22 @@ def test_lost_edges_are_the_stated_share_and_the_others_stay():
 
 
 @pytest.mark.parametrize(
+    ("rate", "lost"), [(12.5, 0.0125), (25.0, 0.05), (50.0, 0.2), (200.0, 0.95)], ids=str
+)
+def test_a_weak_pick_up_loses_more_edges_the_faster_the_rotor_turns(rate, lost):
+    weak = cup(electronics=Electronics(loss_probability=0.05, loss_growth=2.0, dead_time=1e-4))
+    assert weak.calibration_distance == 0.2
+    every = edge_times(steadily_turning(cup(), rate, 600.0), "cup")
+    response = steadily_turning(weak, rate, 600.0)
+    kept = edge_times(response, "cup", seed=3)
+    assert set(kept) < set(every)
+    error = np.sqrt(lost * (1.0 - lost) / len(every))
+    assert 1.0 - len(kept) / len(every) == pytest.approx(lost, abs=4 * error)
+    expected = np.diff(expected_signals(response, "cup").turns) * weak.pulses_per_revolution
+    np.testing.assert_allclose(expected, 1.0 - lost, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
     ("electronics", "counts"),
     [
         (Electronics(loss_probability=0.3), 0.7),
@@ -250,6 +266,7 @@ def test_clock_and_outage_change_stamps_and_leave_the_rest():
         Electronics(),
         Electronics(loss_probability=0.2, bounce_probability=0.3, dead_time=0.003),
         Electronics(bounce_probability=0.5, bounce_delay=0.3, dead_time=0.05),
+        Electronics(loss_probability=0.1, loss_growth=2.0),
     ],
 )
 def test_a_circuit_fed_in_blocks_gives_what_it_gives_at_once(electronics):

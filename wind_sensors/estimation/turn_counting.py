@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.slot_places import SlotPlaces
+from wind_sensors.station.losses import lost_share
 from wind_sensors.station.model import Rotor
 
 FloatArray = npt.NDArray[np.float64]
@@ -18,6 +19,8 @@ _WITHIN_DEAD_TIME = 1.1
 _USUAL_CHANGE = 0.1
 """Standard deviation of the logarithm of one interval over the one before. An edge more is taken
 for lost by chance where that is likelier than so large a change."""
+_RAREST = 1e-9
+"""No loss is held for rarer than this."""
 _FEW = 8
 """So many intervals tell the first rate."""
 _LONGEST_BOUNCE = 3.0
@@ -151,6 +154,12 @@ class TurnCounter:
         first, second = ((t - self._origin) * 1e-9 for t in (last, now))
         return any(o.start < second and o.stop > first for o in self._rotor.outages)
 
+    def _lost(self, edges: float) -> float:
+        """Share of the edges that is lost at a rate of so many a second."""
+        turns = edges / self._rotor.pulses_per_revolution
+        speed = 2.0 * math.pi * turns * self._rotor.calibration_distance
+        return float(lost_share(self._rotor.electronics, speed))
+
     def _passed(self, since: float, usual: float) -> int:
         """Slots passed in a time in which one used to pass in `usual` [s]."""
         e = self._rotor.electronics
@@ -163,7 +172,7 @@ class TurnCounter:
             slots -= 1
         if e.loss_probability == 0.0:
             return slots
-        rare = -math.log(e.loss_probability)
+        rare = -math.log(max(self._lost(1.0 / usual), _RAREST))
 
         def unlikely(passed: int) -> float:
             changed = math.log(since / (passed * usual)) / _USUAL_CHANGE

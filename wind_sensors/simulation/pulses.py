@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from wind_sensors.simulation import random_numbers
 from wind_sensors.simulation.clocks import stamps
 from wind_sensors.simulation.response import Response
 from wind_sensors.station.inputs import resolved
+from wind_sensors.station.losses import lost_share
 from wind_sensors.station.model import Rotor
 from wind_sensors.station.signals import Pulses
 
@@ -201,6 +203,35 @@ def _refuse_what_fills_the_memory(rotor: Rotor, psi: FloatArray) -> None:
         )
 
 
+@dataclass(frozen=True)
+class _Passed:
+    """Slots that passed the sensor while the rotor did not change.
+
+    Attributes:
+        rotor: As it was.
+        times: When they passed [ns].
+        numbers: slot + slots * turn of each.
+        end: Of that time [ns].
+        rate: Of the rotor at the nodes [rad/s], without its sign.
+        nodes: When they passed, counted in nodes.
+    """
+
+    rotor: Rotor
+    times: TimeArray
+    numbers: npt.NDArray[np.int64]
+    end: int
+    rate: FloatArray
+    nodes: FloatArray
+
+    def lost(self) -> FloatArray:
+        """Share of the edges that are lost where each is, shape of `times`; (1,) if all alike."""
+        electronics = self.rotor.electronics
+        if electronics.loss_growth == 0.0:
+            return np.array([electronics.loss_probability])
+        rate = np.interp(self.nodes, np.arange(self.rate.size, dtype=np.float64), self.rate)
+        return lost_share(electronics, rate * self.rotor.calibration_distance)
+
+
 class PulseCircuit:
     """Sensor, contact and logger of one rotor; keeps its state between responses.
 
@@ -219,10 +250,7 @@ class PulseCircuit:
 
     def edges(self, response: Response) -> TimeArray:
         """Stamps of the edges that the logger records in a response [ns], in order of time."""
-        parts = [
-            self._recorded(rotor, times, numbers, end)
-            for rotor, times, numbers, end in self._passed(response)
-        ]
+        parts = [self._recorded(passed) for passed in self._passed(response)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def signals(self, response: Response) -> Pulses:
@@ -236,10 +264,11 @@ class PulseCircuit:
         if resolved(rotor.pulses, "pulses").meaning != "angle":
             return Pulses(self.edges(response))
         time, turns = [], []
-        for now, times, numbers, _ in self._passed(response):
+        for passed in self._passed(response):
+            now, times, numbers = passed.rotor, passed.times, passed.numbers
             kept = ~self._silent(now, times)
             if now.electronics.loss_probability > 0.0:
-                kept &= self._drawn("loss", numbers) >= now.electronics.loss_probability
+                kept &= self._drawn("loss", numbers) >= passed.lost()
             time.append(stamps(now.clock, times[kept], self._origin))
             turns.append(numbers[kept] / now.pulses_per_revolution)
         return Pulses(np.concatenate(time), np.concatenate(turns))
@@ -247,28 +276,32 @@ class PulseCircuit:
     def expected(self, response: Response) -> Pulses:
         """What the logger records on average: every edge, for as many as chance makes of it."""
         time, weights = [], []
-        for rotor, times, numbers, end in self._passed(response):
+        for passed in self._passed(response):
+            rotor = passed.rotor
             electronics = rotor.electronics
             sure = {"bounce_probability": 0.0, "loss_probability": 0.0}
             certain = rotor.model_copy(
                 update={"electronics": electronics.model_copy(update=sure)}
             )
-            part = self._recorded(certain, times, numbers, end)
+            part = self._recorded(replace(passed, rotor=certain))
             longest = LONGEST_BOUNCE * electronics.bounce_delay
             heard = max(1.0 - electronics.dead_time / longest, 0.0)
             bounces = electronics.bounce_probability * heard
+            lost = passed.lost()
+            if electronics.loss_growth > 0.0 and passed.times.size:
+                # Those that a dead time or an outage takes leave fewer edges than passed.
+                lost = np.interp(part, stamps(rotor.clock, passed.times, self._origin), lost)
             time.append(part)
-            counts = (1.0 - electronics.loss_probability + bounces) / rotor.pulses_per_revolution
-            weights.append(np.full(part.size, counts))
+            weights.append(
+                np.full(part.size, (1.0 - lost + bounces) / rotor.pulses_per_revolution)
+            )
         return Pulses(np.concatenate(time), np.cumsum(np.concatenate(weights)))
 
-    def _passed(
-        self, response: Response
-    ) -> list[tuple[Rotor, TimeArray, npt.NDArray[np.int64], int]]:
-        """Of each stretch: the rotor, when slots passed [ns], their numbers, the end [ns]."""
+    def _passed(self, response: Response) -> list[_Passed]:
+        """The slots that passed in each stretch."""
         movement = response.rotors[self._name]
         drive = response.drive
-        out: list[tuple[Rotor, TimeArray, npt.NDArray[np.int64], int]] = []
+        out: list[_Passed] = []
         for stretch in response.stretches:
             rotor = stretch.segment.station.instrument(self._name)
             assert isinstance(rotor, Rotor)
@@ -279,7 +312,9 @@ class PulseCircuit:
                 drive.start_ns, stretch.first * drive.dt,
             )  # fmt: skip
             end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
-            out.append((rotor, times, numbers, end))
+            rate = np.abs(movement.rate[here])
+            node = (times - drive.start_ns) * 1e-9 - stretch.first * drive.dt
+            out.append(_Passed(rotor, times, numbers, end, rate, node / movement.dt))
         return out
 
     def _silent(self, rotor: Rotor, times: TimeArray) -> npt.NDArray[np.bool_]:
@@ -293,9 +328,8 @@ class PulseCircuit:
     def _drawn(self, purpose: str, numbers: npt.NDArray[np.int64]) -> FloatArray:
         return random_numbers.uniform(self._seed, f"{self._name}/{purpose}", numbers)
 
-    def _recorded(
-        self, rotor: Rotor, times: TimeArray, numbers: npt.NDArray[np.int64], end: int
-    ) -> TimeArray:
+    def _recorded(self, passed: _Passed) -> TimeArray:
+        rotor, times, numbers, end = passed.rotor, passed.times, passed.numbers, passed.end
         electronics = rotor.electronics
         bounces: TimeArray = np.empty(0, dtype=np.int64)
         if electronics.bounce_probability > 0.0:
@@ -304,7 +338,7 @@ class PulseCircuit:
             delay = LONGEST_BOUNCE * electronics.bounce_delay * share
             bounces = times[bouncing] + np.rint(delay * 1e9).astype(np.int64)
         if electronics.loss_probability > 0.0:
-            times = times[self._drawn("loss", numbers) >= electronics.loss_probability]
+            times = times[self._drawn("loss", numbers) >= passed.lost()]
         if bounces.size or self._waiting.size:
             times = np.sort(np.concatenate((times, bounces, self._waiting)), kind="stable")
             self._waiting = times[times > end]

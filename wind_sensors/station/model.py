@@ -112,7 +112,10 @@ class Electronics(Entry):
     dead_time: NonNegative = 0.0
     """Edges closer than this to the last accepted one are lost [s]."""
     loss_probability: float = Field(default=0.0, ge=0.0, lt=1.0)
-    """Share of the edges lost at random."""
+    """Share of the edges lost at random; with a growth, at an indicated speed of 5 m/s."""
+    loss_growth: float = Field(default=0.0, ge=0.0, le=8.0)
+    """Exponent with which that share grows with the rotor's rate: a weak pick-up loses pulses as
+    the rotor races. Never more than 0.95 of them."""
     bounce_probability: float = Field(default=0.0, ge=0.0, lt=1.0)
     """Share of the edges followed by a false one."""
     bounce_delay: Positive = 0.002

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.station.losses import LOSS_SPEED
 from wind_sensors.station.model import (
     Angle,
     Clock,
@@ -37,26 +38,32 @@ def _electronics(entry: Entry, **keys: Any) -> dict[str, Electronics]:
 
 def _missed(entry: Entry, values: Values) -> dict[str, Any]:
     return _electronics(
-        entry, dead_time=values["dead_time"], loss_probability=values["loss_probability"]
+        entry,
+        dead_time=values["dead_time"],
+        loss_probability=values["loss_probability"],
+        loss_growth=values["loss_growth"],
     )
 
 
 def _missed_size(values: Values) -> float:
-    return max(values["dead_time"] / 0.001, values["loss_probability"] / 0.01)
+    in_wind = values["loss_probability"] * (10.0 / LOSS_SPEED) ** values["loss_growth"]
+    return max(values["dead_time"] / 0.001, in_wind / 0.01)
 
 
 MISSED_PULSES = Effect(
     name="missed_pulses",
-    meaning="Pulses are lost: those that follow too soon on the last one, or some at random.",
+    meaning="Pulses are lost: those that follow too soon on the last one, or some at random, "
+    "with a weak pick-up the more the faster the rotor turns.",
     entrance="output",
     equation="an edge is lost if it comes within the dead time of the last accepted one, "
-    "or with the loss probability",
+    "or with the loss probability (indicated speed / 5 m/s)^loss_growth",
     source="counter with a non-paralysable dead time",
     region="high rotor rates; doubled pulse intervals",
     standing=0.0,
     parameters=(
         Parameter("dead_time", "s", 0.0, 0.5, minimum=0.001, step=0.0005, spare=True),
         Parameter("loss_probability", "1", 0.0, 0.9, minimum=0.01, step=0.003, spare=True),
+        Parameter("loss_growth", "1", 0.0, 4.0, step=0.2, spare=True),
     ),
     applies=_is_rotor,
     update=_missed,
@@ -69,7 +76,7 @@ MISSED_PULSES = Effect(
         }
     ),
     templates=(
-        {"dead_time": 0.0, "loss_probability": 0.01},
+        {"dead_time": 0.0, "loss_probability": 0.01, "loss_growth": 0.0},
     ),
     confusable={
         "calibration_drift": "pulse intervals: lost pulses double some of them",

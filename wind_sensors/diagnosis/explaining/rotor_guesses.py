@@ -15,6 +15,7 @@ from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, suggested
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
 from wind_sensors.diagnosis.explaining.ruled_out import comes_sooner
+from wind_sensors.station.losses import LOSS_SPEED
 from wind_sensors.station.model import Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -61,6 +62,13 @@ within this share of it, as below: a fit of the whole signal would trade it for 
 APART = 5.0
 """Bounces tell their delay if so many times as many intervals are shorter than three tenths of the
 usual one as between that and four tenths: a fit would trade it for another rate."""
+
+GROWS = 4.0
+"""Losses grow with the rate if the faster half of the intervals shows more of them than the slower
+half by so many standard errors."""
+
+MOST_GROWTH = 4.0
+"""Exponent beyond which no search begins."""
 
 _RATE_THAT_TURNS = 1.5
 
@@ -139,9 +147,9 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     usual_long = float(np.mean(usual[1:] > 1.6 * usual[:-1]))
     dead = _dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual))
     if long > 0.004 + 2.0 * usual_long and not any(term.held for term in dead):
-        out.append(
-            suggested("missed_pulses", rotor.name, dead_time=0.0, loss_probability=min(long, 0.6))
-        )
+        per_turn = 2.0 * np.pi * rotor.calibration_distance / rotor.pulses_per_revolution
+        speed = per_turn / np.maximum(local, 1e-9)
+        out.append(_losses_by_chance(rotor, relative > 1.6, speed))
     out.extend(dead)
     if short > 0.004:
         delay = float(np.mean(interval[relative < 0.4]))
@@ -164,6 +172,28 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         uneven = suggested("encoder_slot_error", rotor.name, **slot_values(told))
         out.append(replace(uneven, interval=holds))
     return out
+
+
+def _losses_by_chance(rotor: Rotor, long: npt.NDArray[np.bool_], speed: FloatArray) -> Term:
+    """Random losses, as often as intervals are long; growing with the rate where these do.
+
+    Args:
+        rotor: Gives the pulses.
+        long: Which intervals are too long for their time.
+        speed: That the healthy rotor indicates then [m/s].
+    """
+    share, growth = float(long.mean()), 0.0
+    fast = speed > np.median(speed)
+    often, seldom = float(long[fast].mean()), float(long[~fast].mean())
+    error = np.sqrt(2.0 * share * (1.0 - share) / (0.5 * long.size))
+    if seldom > 0.0 and often - seldom > GROWS * error:
+        faster = float(speed[fast].mean() / speed[~fast].mean())
+        growth = min(float(np.log(often / seldom) / np.log(faster)), MOST_GROWTH)
+    grown = float(np.mean((speed / LOSS_SPEED) ** growth))
+    return suggested(
+        "missed_pulses", rotor.name,
+        dead_time=0.0, loss_probability=min(share / grown, 0.6), loss_growth=growth,
+    )  # fmt: skip
 
 
 def _uneven_span(comparison: Comparison, seen: SlotIntervals) -> Interval:
@@ -232,7 +262,8 @@ def _dead_times(
     return [
         replace(
             suggested(
-                "missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0
+                "missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0,
+                loss_growth=0.0,
             ),
             interval=holds,
             held=frozenset({"dead_time"}) if told else frozenset(),
