@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from wind_sensors.diagnosis.comparing import spectra
@@ -47,6 +49,18 @@ def test_slope_is_the_power_of_the_coherence_that_the_errors_imply(
         slopes.append((coherence.cross / coherence.simulated)[5:])
         powers.append((coherence.squared**exponent)[5:])
     assert np.mean(slopes) == pytest.approx(np.mean(powers), rel=0.03)
+
+
+@given(st.integers(1, 200_000))
+def test_quick_lengths_have_no_large_prime_factor_and_cost_little(n: int) -> None:
+    length = spectra.quick_length(n)
+    assert 0.97 * n <= length <= n
+    rest = length
+    for factor in range(2, 24):
+        while rest % factor == 0:
+            rest //= factor
+    assert rest == 1
+    assert spectra.quick_length(length) == length
 
 
 def test_noise_variance_whitens_red_noise() -> None:

@@ -312,7 +312,7 @@ class PulseCircuit:
                 drive.start_ns, stretch.first * drive.dt,
             )  # fmt: skip
             end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
-            rate = np.abs(movement.rate[here])
+            rate: FloatArray = np.abs(movement.rate[here])
             node = (times - drive.start_ns) * 1e-9 - stretch.first * drive.dt
             out.append(_Passed(rotor, times, numbers, end, rate, node / movement.dt))
         return out

@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.comparing.observation import (
 )
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
+from wind_sensors.diagnosis.comparing.spectra import quick_length
 from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import drive_from_recording
@@ -82,7 +83,9 @@ def prepare(
             recording.name,
             f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
         )
-    grid = Grid(drive.start_ns, SERIES_INTERVAL, int(seconds / SERIES_INTERVAL))
+    whole = int(seconds / SERIES_INTERVAL)
+    number = quick_length(whole)
+    grid = Grid(drive.start_ns, SERIES_INTERVAL * whole / number, number)
     channels = tuple(
         c
         for c in channels_of(known)

@@ -47,7 +47,7 @@ def _missed(entry: Entry, values: Values) -> dict[str, Any]:
 
 def _missed_size(values: Values) -> float:
     in_wind = values["loss_probability"] * (10.0 / LOSS_SPEED) ** values["loss_growth"]
-    return max(values["dead_time"] / 0.001, in_wind / 0.01)
+    return float(max(values["dead_time"] / 0.001, in_wind / 0.01))
 
 
 MISSED_PULSES = Effect(

@@ -42,6 +42,11 @@ NEARLY_AS_WELL_BESIDE = 25.0
 AS_MUCH = 6.0
 """Of explanations that bring less by no more than this, the region that stands out decides."""
 
+HARDLY_BY_CHANCE = 0.005
+NEARLY_ENOUGH = 0.75
+"""Where the strongest region has no larger probability on a healthy day (none of 73 healthy
+recordings has one), an explanation of it that brings this share of what a name needs is enough."""
+
 EXPLAINED = 0.5
 """Share of the region's score below which what is left is no more than its noise."""
 
@@ -66,6 +71,7 @@ def leader_of(
     """
     so_far = evidence(current, whitener)
     enough: list[tuple[float, Judged]] = []
+    nearly: list[tuple[float, Judged]] = []
     likeliest = np.inf
     for one in sorted(ranked, key=not_told):
         told = one.fit.terms[-1].is_told
@@ -80,11 +86,13 @@ def leader_of(
         )
         if brings >= least and told:
             return one
+        if brings >= NEARLY_ENOUGH * least:
+            nearly.append((brings, one))
         if brings >= least:
             enough.append((brings, one))
             likeliest = min(likeliest, one.evidence)
     if not enough:
-        return None
+        return None if current.terms else _hardly_by_chance(searcher, whitener, current, nearly)
     enough = [
         pair
         for pair in enough
@@ -102,6 +110,39 @@ def leader_of(
         and one.evidence < leader.evidence + owed(leader.fit.terms[-1], one.fit.terms[-1])
     ]
     return min(simpler, key=lambda one: one.evidence, default=leader)
+
+
+def _hardly_by_chance(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    nearly: list[tuple[float, Judged]],
+) -> Judged | None:
+    """What brings nearly enough and explains a region that no healthy day shows; None: nothing.
+
+    What is compared everywhere and the region that stands out tell of one thing in two ways: a
+    vane's friction, small in the whole record, and the small turns of a lull.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        current: Without a term.
+        nearly: What each brings, and the explanation.
+    """
+    if not nearly:
+        return None
+    bank = region_bank(whitener, searcher.bank.without)
+    before = bank.scores(current.vector)
+    strongest = int(np.argmax(before))
+    if bank.p_value(float(before[strongest])) > HARDLY_BY_CHANCE:
+        return None
+    explaining = [
+        (brings, one)
+        for brings, one in nearly
+        if bank.scores(whitener.of(one.fit.simulated))[strongest]
+        < EXPLAINED * float(before[strongest])
+    ]
+    return max(explaining, key=lambda pair: pair[0])[1] if explaining else None
 
 
 def explaining_what_stands_out(
