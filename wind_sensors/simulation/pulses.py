@@ -312,9 +312,10 @@ class PulseCircuit:
                 drive.start_ns, stretch.first * drive.dt,
             )  # fmt: skip
             end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
-            rate: FloatArray = np.abs(movement.rate[here])
-            node = (times - drive.start_ns) * 1e-9 - stretch.first * drive.dt
-            out.append(_Passed(rotor, times, numbers, end, rate, node / movement.dt))
+            rate = np.abs(movement.rate[here])
+            since = (times - drive.start_ns) * 1e-9 - stretch.first * drive.dt
+            nodes = np.asarray(since / movement.dt, dtype=np.float64)
+            out.append(_Passed(rotor, times, numbers, end, rate, nodes))
         return out
 
     def _silent(self, rotor: Rotor, times: TimeArray) -> npt.NDArray[np.bool_]:
