@@ -90,9 +90,10 @@ def baseline() -> Baseline:
 
 
 @lru_cache(maxsize=4)
-def diagnosed(effect: str, instrument: str, seed: int = 50, **values: float) -> Diagnosis:
+def diagnosed(effect: str, instrument: str, **values: float) -> Diagnosis:
+    """What is found with one effect in a wind that turns far enough to tell where it acts."""
     station = with_effect(STATION, catalogue()[effect], instrument, values)
-    return diagnose(recorded(station, seed), baseline())
+    return diagnose(recorded(station, 50, swing=0.8), baseline())
 
 
 def drift(interval: Interval = ALWAYS) -> Term:
