@@ -34,6 +34,7 @@ class Parameter:
         step: Size of a finite difference; 0: a tenth of `minimum`, or of the bounds' distance.
         wraps: Period of an angle, 0 for none.
         free: Whether what drives the recording lets it be fitted; None: always.
+        tied: Value at which it is held where `free` says no; None: the healthy one.
         swing: Smallest change of the air's temperature, while the effect holds, that the parameter
             needs [K]; with less it keeps its healthy value.
         spare: Whether the effect is often there without it: it keeps its healthy value where the
@@ -54,7 +55,12 @@ class Parameter:
     swing: float = 0.0
     spare: bool = False
     free: Callable[[Drive], bool] | None = None
+    tied: float | None = None
     value_from: Literal["fit", "signals", "forms"] = "fit"
+
+    def is_free(self, drive: Drive) -> bool:
+        """Whether what drives a recording lets it be fitted."""
+        return self.free is None or self.free(drive)
 
     @property
     def difference(self) -> float:

@@ -122,9 +122,20 @@ MOST_IMBALANCE = 10.0
 """[1/m]. The moment of mass over the moment of inertia is at most one over the radius of gyration,
 for the centre of mass lies no farther out; a vane's is ten centimetres and more."""
 
+SMALLEST_IMBALANCE = 0.15
+"""Worth reporting on a carrier that rolls or accelerates [1/m]."""
+
 MOST_LEAN_DEG = 6.0
 """In each direction: gravity turns a vane on a mast that looks upright. More would deflect the flow
 along the vane, which is another effect."""
+
+
+USUAL_IMBALANCE = 6.0
+"""[1/m]. On a mast that looks upright only the product with its lean is seen: that of a vane with a
+counterweight too few, for which the lean is then told."""
+
+SMALLEST_PULL = 0.45
+"""Imbalance times lean worth reporting [deg/m]: the smallest imbalance at a lean of 3 degrees."""
 
 
 def _has_no_attitude(drive: Drive) -> bool:
@@ -132,33 +143,52 @@ def _has_no_attitude(drive: Drive) -> bool:
     return drive.motion is None
 
 
+def _has_attitude(drive: Drive) -> bool:
+    return not _has_no_attitude(drive)
+
+
+def _imbalance_size(values: Values) -> float:
+    lean = math.hypot(values["tilt_x"], values["tilt_y"])
+    if lean == 0.0:
+        return abs(values["imbalance"]) / SMALLEST_IMBALANCE
+    return abs(values["imbalance"]) * lean / SMALLEST_PULL
+
+
 VANE_IMBALANCE = Effect(
     name="vane_imbalance",
     meaning="The vane's centre of mass lies off its axis, so that tilt and acceleration turn it.",
     entrance="response",
-    equation="phi'' += b (-g_x sin(phi) + g_y cos(phi))",
+    equation="phi'' += b (-g_x sin(phi) + g_y cos(phi)); on a mast at rest only b times the lean "
+    "is seen, and b is set to 6 1/m",
     source="derived: pendulum term of a vane on a leaning axis",
     region="low speeds, on a mount that leans or accelerates",
     occasional=True,
     parameters=(
         Parameter(
-            "imbalance", "1/m", -MOST_IMBALANCE, MOST_IMBALANCE, minimum=0.15, step=0.05,
-            starts=(0.5, -0.5, 2.5, -2.5),
+            "imbalance", "1/m", -MOST_IMBALANCE, MOST_IMBALANCE, minimum=SMALLEST_IMBALANCE,
+            step=0.05, starts=(0.5, -0.5, 2.5, -2.5), free=_has_attitude, tied=USUAL_IMBALANCE,
         ),
-        Parameter("tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
-        Parameter("tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.5, free=_has_no_attitude),
+        Parameter(
+            "tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.1, starts=(2.0, -2.0),
+            free=_has_no_attitude,
+        ),
+        Parameter(
+            "tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.1, starts=(2.0, -2.0),
+            free=_has_no_attitude,
+        ),
     ),
     applies=is_vane,
     update=_imbalance,
     templates=(
-        {"imbalance": 0.3, "tilt_x": 3.0, "tilt_y": 0.0},
-        {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 3.0},
+        {"imbalance": USUAL_IMBALANCE, "tilt_x": 0.15, "tilt_y": 0.0},
+        {"imbalance": USUAL_IMBALANCE, "tilt_x": 0.0, "tilt_y": 0.15},
         {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 0.0},
     ),
     confusable={
         "vane_eccentricity": "strong wind: imbalance fades as 1/U^2, eccentricity stays",
         "vane_friction": "level the mount; balance the vane on its pivot",
     },
+    size=_imbalance_size,
 )
 
 

@@ -431,8 +431,10 @@ def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, Floa
     drive = whitener.comparison.drive
     swings = [_swing(drive, term.interval) for term in terms]
     for k, (owner, parameter) in enumerate(placed):
-        tied = parameter.free is not None and not parameter.free(drive)
-        if (tied or parameter.swing > swings[owner]) and parameter.healthy is not None:
+        tied = not parameter.is_free(drive)
+        if tied and parameter.tied is not None:
+            low[k] = high[k] = parameter.tied
+        elif (tied or parameter.swing > swings[owner]) and parameter.healthy is not None:
             low[k] = high[k] = parameter.healthy
         elif not terms[owner].fits(parameter):
             low[k] = high[k] = values_of(terms)[k]

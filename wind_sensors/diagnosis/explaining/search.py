@@ -168,13 +168,14 @@ class Searcher:
         signatures = self.white_signatures(whitener)
         scores = screen(self.probes.templates, signatures, vector)
         groups = group_templates(self.probes.templates)
+        drive = self.comparison.drive
         out: list[list[Term]] = []
         worth = max(LEAST_GAIN, LEAST_SHARE * scores[0].gain) if scores else 0.0
         for score in [s for s in scores[:number] if s.gain > worth and self._may_be(s)]:
             effect = self.effects[score.effect]
             start = starting_values(score)
             starts = [Term(effect, score.instrument, start)]
-            for parameter in effect.parameters:
+            for parameter in (p for p in effect.parameters if p.is_free(drive)):
                 starts.extend(
                     Term(effect, score.instrument, {**start, parameter.name: value})
                     for value in parameter.starts

@@ -295,7 +295,8 @@ def discord(naming: Naming, station: Station, term: Term) -> float:
     null = naming.adequate
     comparison = null.comparison
     without = _without(naming, station, term)
-    if without is None:
+    # What a vane does to a propeller that it turns away from the wind is not its own size.
+    if without is None or any(c.instrument == term.instrument for c in comparison.channels):
         return 0.0
     change = naming.fit.simulated.flat(comparison.channels) - without.flat(comparison.channels)
     change = np.nan_to_num(change) * comparison.weights(null.trust)

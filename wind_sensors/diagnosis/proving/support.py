@@ -15,6 +15,10 @@ SHOWN_P = 0.05
 LEAST_REMOVED = 0.7
 """Share of the excess misfit that held-out blocks must lose to what is named."""
 
+LEAST_OF_ALL = 0.2
+"""The same of the excess on all signals, those among them that the effects do not reach: what makes
+up less is not what is wrong with the record."""
+
 LEAST_NOISY_REMOVED = 0.5
 NOISE_LEFT = 1.1
 """The same where an effect comes with noise of its own, which is another one in other blocks, if no
@@ -113,8 +117,10 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
     others: it has to stand out instead, and do there what the next-best explanation does.
     """
     proof = next((f.proof for f in findings if f.proof is not None), None)
-    if proof is None or proof.removed_where_it_acts > LEAST_REMOVED:
+    if proof is None:
         return True
+    if proof.removed_where_it_acts > LEAST_REMOVED:
+        return proof.excess_removed > LEAST_OF_ALL
     noisy = any(f.term.effect.noisy for f in findings)
     if noisy and proof.after < NOISE_LEFT and proof.removed_where_it_acts > LEAST_NOISY_REMOVED:
         return True
