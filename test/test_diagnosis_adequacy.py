@@ -326,6 +326,14 @@ def test_what_acts_seldom_cannot_be_asked_of_every_block(
     assert borne_out((found,)) is borne
 
 
+@pytest.mark.parametrize(("of_all", "borne"), [(0.03, False), (0.45, True)])
+def test_what_is_named_makes_up_a_part_of_all_that_is_wrong(of_all: float, borne: bool) -> None:
+    found = _finding(*OFFSET, 0.9, 0.002)
+    assert found.proof is not None
+    proof = replace(found.proof, excess_removed=of_all, own_removed=0.87)
+    assert borne_out((replace(found, proof=proof),)) is borne
+
+
 @pytest.mark.parametrize(("low", "high", "known"), [(0.1, 0.5, True), (-0.5, 0.9, False)])
 def test_a_name_needs_a_size_that_is_not_nought(low: float, high: float, known: bool) -> None:
     offset = {"offset": Estimate(0.3, low, high, "m/s")}

@@ -50,6 +50,18 @@ def test_a_planted_effect_gets_its_name_and_its_size(effect: str) -> None:
     assert proof.excess_removed > 0.8
 
 
+def test_of_a_vane_out_of_balance_on_a_mast_the_product_with_the_lean_is_told() -> None:
+    values = {"imbalance": 7.0, "tilt_x": 5.0, "tilt_y": -4.0}
+    found = diagnosed("vane_imbalance", "vane", **values)
+    assert [f.term.key for f in found.findings] == [("vane_imbalance", "vane")]
+    term = found.findings[0].term
+    # Which lean it is with another imbalance, hangs a little on the flow past a leaning mast.
+    pull = [term.values["imbalance"] * term.values[lean] for lean in ("tilt_x", "tilt_y")]
+    assert pull == pytest.approx([35.0, -28.0], abs=8.0)
+    assert term.relative_size == pytest.approx(7.0 * 6.4 / 0.45, rel=0.15)
+    assert set(found.findings[0].parameters) == {"tilt_x", "tilt_y"}
+
+
 def test_the_corrected_station_no_longer_differs() -> None:
     found = diagnosed("calibration_drift", "cup", gain=0.94)
     again = diagnose(
