@@ -168,6 +168,19 @@ class Effect:
         """
         return any(p.value_from == "signals" for p in self.parameters)
 
+    def templates_for(self, drive: Drive) -> list[tuple[int, dict[str, float]]]:
+        """Templates with their numbers; where a parameter is tied, those that have it there.
+
+        Args:
+            drive: What drives the recording.
+        """
+        tied = {p.name: p for p in self.parameters if p.tied is not None}
+        return [
+            (number, values)
+            for number, values in enumerate(self.templates)
+            if all((values[n] == p.tied) != p.is_free(drive) for n, p in tied.items())
+        ]
+
     def scaled(self, values: Values, factor: float) -> dict[str, float]:
         """Values with their departure from health multiplied, within their bounds."""
         out = dict(values)

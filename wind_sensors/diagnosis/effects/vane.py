@@ -180,9 +180,11 @@ VANE_IMBALANCE = Effect(
     applies=is_vane,
     update=_imbalance,
     templates=(
+        {"imbalance": 0.3, "tilt_x": 3.0, "tilt_y": 0.0},
+        {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 3.0},
+        {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 0.0},
         {"imbalance": USUAL_IMBALANCE, "tilt_x": 0.15, "tilt_y": 0.0},
         {"imbalance": USUAL_IMBALANCE, "tilt_x": 0.0, "tilt_y": 0.15},
-        {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 0.0},
     ),
     confusable={
         "vane_eccentricity": "strong wind: imbalance fades as 1/U^2, eccentricity stays",

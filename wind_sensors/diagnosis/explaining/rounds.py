@@ -400,7 +400,8 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         key = (effect.name, last.instrument)
         confusable = effect.name in last.effect.confusable or last.effect.name in effect.confusable
         if confusable and key in possible and key not in starts and not effect.legible:
-            starts[key] = [Term(effect, key[1], dict(values)) for values in effect.templates]
+            templates = effect.templates_for(searcher.comparison.drive)
+            starts[key] = [Term(effect, key[1], dict(values)) for _, values in templates]
     return [
         [replace(start, interval=last.interval) for start in of_one]
         for key, of_one in starts.items()
