@@ -122,6 +122,8 @@ class Effect:
             certain: what it leaves there says little against it.
         stirs: It brings eddies of its own where it acts, of which the reference knows nothing.
         needs: Data without which it cannot be seen.
+        tie: From values in proportion to the templates', those that act alike where what may be
+            `tied` is; None: nothing may be.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.
     """
@@ -154,6 +156,7 @@ class Effect:
     standing: float = 0.1
     standing_in_calm: float = 0.0
     needs: tuple[str, ...] = ()
+    tie: Callable[[Values], dict[str, float]] | None = None
     size: Callable[[Values], float] | None = None
 
     def __reduce__(self) -> tuple[Callable[[str], Effect], tuple[str]]:
@@ -168,18 +171,15 @@ class Effect:
         """
         return any(p.value_from == "signals" for p in self.parameters)
 
-    def templates_for(self, drive: Drive) -> list[tuple[int, dict[str, float]]]:
-        """Templates with their numbers; where a parameter is tied, those that have it there.
+    def begun(self, values: Values, drive: Drive) -> dict[str, float]:
+        """Values of about the size of the templates', from which a fit can begin.
 
         Args:
+            values: Departures from health in proportion to those of the templates.
             drive: What drives the recording.
         """
-        tied = {p.name: p for p in self.parameters if p.tied is not None}
-        return [
-            (number, values)
-            for number, values in enumerate(self.templates)
-            if all((values[n] == p.tied) != p.is_free(drive) for n, p in tied.items())
-        ]
+        tied = any(p.tied is not None and not p.is_free(drive) for p in self.parameters)
+        return self.tie(values) if tied and self.tie is not None else dict(values)
 
     def scaled(self, values: Values, factor: float) -> dict[str, float]:
         """Values with their departure from health multiplied, within their bounds."""

@@ -134,6 +134,9 @@ USUAL_IMBALANCE = 6.0
 """[1/m]. On a mast that looks upright only the product with its lean is seen: that of a vane with a
 counterweight too few, for which the lean is then told."""
 
+TEMPLATE_IMBALANCE = 0.3
+"""[1/m]. With leans of 3 degrees: a healthy vane's own lean is among what stands in it."""
+
 SMALLEST_PULL = 0.45
 """Imbalance times lean worth reporting [deg/m]: the smallest imbalance at a lean of 3 degrees."""
 
@@ -145,6 +148,12 @@ def _has_no_attitude(drive: Drive) -> bool:
 
 def _has_attitude(drive: Drive) -> bool:
     return not _has_no_attitude(drive)
+
+
+def _pull_of_leans(values: Values) -> dict[str, float]:
+    share = TEMPLATE_IMBALANCE / USUAL_IMBALANCE
+    leans = {name: share * values[name] for name in ("tilt_x", "tilt_y")}
+    return {"imbalance": USUAL_IMBALANCE, **leans}
 
 
 def _imbalance_size(values: Values) -> float:
@@ -180,16 +189,15 @@ VANE_IMBALANCE = Effect(
     applies=is_vane,
     update=_imbalance,
     templates=(
-        {"imbalance": 0.3, "tilt_x": 3.0, "tilt_y": 0.0},
-        {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 3.0},
-        {"imbalance": 0.3, "tilt_x": 0.0, "tilt_y": 0.0},
-        {"imbalance": USUAL_IMBALANCE, "tilt_x": 0.15, "tilt_y": 0.0},
-        {"imbalance": USUAL_IMBALANCE, "tilt_x": 0.0, "tilt_y": 0.15},
+        {"imbalance": TEMPLATE_IMBALANCE, "tilt_x": 3.0, "tilt_y": 0.0},
+        {"imbalance": TEMPLATE_IMBALANCE, "tilt_x": 0.0, "tilt_y": 3.0},
+        {"imbalance": TEMPLATE_IMBALANCE, "tilt_x": 0.0, "tilt_y": 0.0},
     ),
     confusable={
         "vane_eccentricity": "strong wind: imbalance fades as 1/U^2, eccentricity stays",
         "vane_friction": "level the mount; balance the vane on its pivot",
     },
+    tie=_pull_of_leans,
     size=_imbalance_size,
 )
 

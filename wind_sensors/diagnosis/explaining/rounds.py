@@ -400,8 +400,10 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         key = (effect.name, last.instrument)
         confusable = effect.name in last.effect.confusable or last.effect.name in effect.confusable
         if confusable and key in possible and key not in starts and not effect.legible:
-            templates = effect.templates_for(searcher.comparison.drive)
-            starts[key] = [Term(effect, key[1], dict(values)) for _, values in templates]
+            drive = searcher.comparison.drive
+            starts[key] = [
+                Term(effect, key[1], effect.begun(values, drive)) for values in effect.templates
+            ]
     return [
         [replace(start, interval=last.interval) for start in of_one]
         for key, of_one in starts.items()

@@ -173,7 +173,7 @@ class Searcher:
         worth = max(LEAST_GAIN, LEAST_SHARE * scores[0].gain) if scores else 0.0
         for score in [s for s in scores[:number] if s.gain > worth and self._may_be(s)]:
             effect = self.effects[score.effect]
-            start = starting_values(score)
+            start = effect.begun(starting_values(score), drive)
             starts = [Term(effect, score.instrument, start)]
             for parameter in (p for p in effect.parameters if p.is_free(drive)):
                 starts.extend(

@@ -42,7 +42,6 @@ class Template:
         number: Which of the effect's templates.
         values: Parameters.
         multiple: Of the effect's template.
-        among: How many templates of the effect there are.
     """
 
     effect: Effect
@@ -50,7 +49,6 @@ class Template:
     number: int
     values: Mapping[str, float]
     multiple: float = 1.0
-    among: int = 1
 
     @property
     def key(self) -> str:
@@ -61,7 +59,7 @@ class Template:
     def smallest_standing(self) -> float:
         """Least standing size in units of the template; a bank of templates shares it."""
         size = max(self.effect.relative_size(self.values), 0.5)
-        crowd = max(1.0, self.among / 4.0)
+        crowd = max(1.0, len(self.effect.templates) / 4.0)
         return float(self.effect.standing / size / np.sqrt(crowd))
 
     @property
@@ -116,10 +114,9 @@ def templates_of(
                 for one in touched(station, effect, name)
             ):
                 continue
-            templates = effect.templates_for(comparison.drive)
             out.extend(
-                Template(effect, name, number, values, among=len(templates))
-                for number, values in templates
+                Template(effect, name, number, values)
+                for number, values in enumerate(effect.templates)
                 if _visited(comparison, effect, values)
             )
     return out
