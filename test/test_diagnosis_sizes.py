@@ -15,16 +15,27 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     SMALLEST_SIZE,
     SMALLEST_SURE,
     SURE_ALONE_GAIN,
+    brought,
     gained_alike,
     is_plausible,
     least_size,
     overlap,
 )
 from wind_sensors.diagnosis.explaining.bounds import without_spare
-from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, no_terms
+from wind_sensors.diagnosis.explaining.explanation import (
+    Judged,
+    Naming,
+    evidence,
+    judged,
+    no_terms,
+)
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, covariance_of, fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.leading import explaining_what_stands_out, leading_alone
+from wind_sensors.diagnosis.explaining.leading import (
+    explaining_what_stands_out,
+    leader_of,
+    leading_alone,
+)
 from wind_sensors.diagnosis.explaining.moments import is_its_moment
 from wind_sensors.diagnosis.explaining.screening import scores_of
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
@@ -322,6 +333,38 @@ def test_of_explanations_as_good_the_one_of_what_stands_out_leads() -> None:
     between = [(30.0, slow), (20.0, turned)]
     assert explaining_what_stands_out(searcher, null, nothing, between) == between
     assert explaining_what_stands_out(searcher, null, nothing, between, 12.0) == between[1:]
+
+
+@pytest.mark.parametrize(
+    ("effect", "instrument", "values", "share", "leads"),
+    [
+        ("vane_offset", "vane", {"offset": 4.0}, 0.8, True),
+        ("vane_offset", "vane", {"offset": 4.0}, 0.7, False),
+        ("calibration_offset", "cup", {"offset": 0.5}, 0.8, False),
+    ],
+)
+def test_what_explains_a_region_that_chance_hardly_makes_needs_less(
+    monkeypatch: pytest.MonkeyPatch,
+    effect: str,
+    instrument: str,
+    values: dict[str, float],
+    share: float,
+    leads: bool,
+) -> None:
+    both = with_effect(STATION, catalogue()["vane_offset"], "vane", {"offset": 4.0})
+    both = with_effect(both, catalogue()["calibration_offset"], "cup", {"offset": 0.5})
+    searcher = compared(both)
+    null = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(null, searcher)
+    # The turned vane is the clearer of the two.
+    term = Term(catalogue()[effect], instrument, values)
+    (one,) = judged(searcher, [fit(null, STATION, [term], searcher.bank.without)])
+    brings = brought(searcher, one, nothing, evidence(nothing, null))
+    assert brings > 0.0
+    monkeypatch.setattr(
+        "wind_sensors.diagnosis.explaining.leading.needed_gain", lambda *_: brings / share
+    )
+    assert (leader_of(searcher, null, nothing, [one]) is one) is leads
 
 
 def compared(planted: Station) -> Searcher:
