@@ -139,7 +139,11 @@ def test_losses_that_grow_with_the_rate_are_told_from_those_that_do_not(growth: 
     (finding,) = diagnose(recorded(station, 87), baseline()).findings
     assert finding.term.effect.name == "missed_pulses"
     assert finding.term.values["loss_growth"] == pytest.approx(growth, abs=0.6)
-    assert finding.term.values["loss_probability"] == pytest.approx(0.05, rel=0.25)
+    # The mean wind tells how many are lost; at another speed the exponent's error comes in.
+    lost = finding.term.values["loss_probability"] * (7.0 / 5.0) ** (
+        finding.term.values["loss_growth"]
+    )
+    assert lost == pytest.approx(0.05 * (7.0 / 5.0) ** growth, rel=0.15)
     assert finding.proof is not None and finding.proof.excess_removed > 0.8
 
 
