@@ -212,8 +212,9 @@ class _Passed:
         times: When they passed [ns].
         numbers: slot + slots * turn of each.
         end: Of that time [ns].
-        rate: Of the rotor at the nodes [rad/s], without its sign.
-        nodes: When they passed, counted in nodes.
+        rate: Of the rotor at the nodes [rad/s].
+        begin: Time of the first node [ns].
+        dt: Between nodes [s].
     """
 
     rotor: Rotor
@@ -221,14 +222,16 @@ class _Passed:
     numbers: npt.NDArray[np.int64]
     end: int
     rate: FloatArray
-    nodes: FloatArray
+    begin: int
+    dt: float
 
     def lost(self) -> FloatArray:
         """Share of the edges that are lost where each is, shape of `times`; (1,) if all alike."""
         electronics = self.rotor.electronics
         if electronics.loss_growth == 0.0:
             return np.array([electronics.loss_probability])
-        rate = np.interp(self.nodes, np.arange(self.rate.size, dtype=np.float64), self.rate)
+        nodes = (self.times - self.begin) * (1e-9 / self.dt)
+        rate = np.interp(nodes, np.arange(self.rate.size), np.abs(self.rate))
         return lost_share(electronics, rate * self.rotor.calibration_distance)
 
 
@@ -312,10 +315,9 @@ class PulseCircuit:
                 drive.start_ns, stretch.first * drive.dt,
             )  # fmt: skip
             end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
-            rate = np.abs(movement.rate[here])
-            since = (times - drive.start_ns) * 1e-9 - stretch.first * drive.dt
-            nodes = np.asarray(since / movement.dt, dtype=np.float64)
-            out.append(_Passed(rotor, times, numbers, end, rate, nodes))
+            begin = drive.start_ns + round(stretch.first * drive.dt * 1e9)
+            rate = movement.rate[here]
+            out.append(_Passed(rotor, times, numbers, end, rate, begin, movement.dt))
         return out
 
     def _silent(self, rotor: Rotor, times: TimeArray) -> npt.NDArray[np.bool_]:

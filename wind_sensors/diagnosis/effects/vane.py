@@ -129,7 +129,6 @@ MOST_LEAN_DEG = 6.0
 """In each direction: gravity turns a vane on a mast that looks upright. More would deflect the flow
 along the vane, which is another effect."""
 
-
 USUAL_IMBALANCE = 6.0
 """[1/m]. On a mast that looks upright only the product with its lean is seen: that of a vane with a
 counterweight too few, for which the lean is then told."""

@@ -131,18 +131,37 @@ def _hardly_by_chance(
     """
     if not nearly:
         return None
+    explaining = _explaining_strongest(searcher, whitener, current, nearly, HARDLY_BY_CHANCE)
+    return max(explaining, key=lambda pair: pair[0])[1] if explaining else None
+
+
+def _explaining_strongest(
+    searcher: Searcher,
+    whitener: Whitener,
+    current: Fit,
+    rivals: list[tuple[float, Judged]],
+    probability: float,
+) -> list[tuple[float, Judged]]:
+    """Those that explain most of the strongest region; none, where chance may well have made it.
+
+    Args:
+        searcher: The search.
+        whitener: The null of the terms so far.
+        current: The terms so far.
+        rivals: What each brings, and the explanation.
+        probability: Of the region on a healthy day, at most.
+    """
     bank = region_bank(whitener, searcher.bank.without)
     before = bank.scores(current.vector)
     strongest = int(np.argmax(before))
-    if bank.p_value(float(before[strongest])) > HARDLY_BY_CHANCE:
-        return None
-    explaining = [
-        (brings, one)
-        for brings, one in nearly
-        if bank.scores(whitener.of(one.fit.simulated))[strongest]
-        < EXPLAINED * float(before[strongest])
-    ]
-    return max(explaining, key=lambda pair: pair[0])[1] if explaining else None
+    score = float(before[strongest])
+    if bank.p_value(score) > probability:
+        return []
+
+    def left(one: Judged) -> float:
+        return float(bank.scores(whitener.of(one.fit.simulated))[strongest])
+
+    return [pair for pair in rivals if left(pair[1]) < EXPLAINED * score]
 
 
 def explaining_what_stands_out(
@@ -165,17 +184,7 @@ def explaining_what_stands_out(
     rivals = [pair for pair in enough if pair[0] > most - near]
     if len({one.fit.terms[-1].key for _, one in rivals}) < 2:
         return enough
-    bank = region_bank(whitener, searcher.bank.without)
-    before = bank.scores(current.vector)
-    strongest = int(np.argmax(before))
-    if bank.p_value(float(before[strongest])) > STANDS_OUT:
-        return enough
-
-    def left(one: Judged) -> float:
-        return float(bank.scores(whitener.of(one.fit.simulated))[strongest])
-
-    explaining = [p for p in rivals if left(p[1]) < EXPLAINED * float(before[strongest])]
-    return explaining or enough
+    return _explaining_strongest(searcher, whitener, current, rivals, STANDS_OUT) or enough
 
 
 def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:

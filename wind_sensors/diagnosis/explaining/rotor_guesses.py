@@ -184,7 +184,8 @@ def _losses_by_chance(rotor: Rotor, long: npt.NDArray[np.bool_], speed: FloatArr
     """
     share, growth = float(long.mean()), 0.0
     fast = speed > np.median(speed)
-    often, seldom = float(long[fast].mean()), float(long[~fast].mean())
+    # In a wind that never changes no interval is faster than the median.
+    often, seldom = (float(np.mean(long[k])) if k.any() else 0.0 for k in (fast, ~fast))
     error = np.sqrt(2.0 * share * (1.0 - share) / (0.5 * long.size))
     if seldom > 0.0 and often - seldom > GROWS * error:
         faster = float(speed[fast].mean() / speed[~fast].mean())
