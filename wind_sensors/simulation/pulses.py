@@ -276,8 +276,13 @@ class PulseCircuit:
             turns.append(numbers[kept] / now.pulses_per_revolution)
         return Pulses(np.concatenate(time), np.concatenate(turns))
 
-    def expected(self, response: Response) -> Pulses:
-        """What the logger records on average: every edge, for as many as chance makes of it."""
+    def expected(self, response: Response, bounces: bool = True) -> Pulses:
+        """What the logger records on average: every edge, for as many as chance makes of it.
+
+        Args:
+            response: What the rotor does.
+            bounces: Whether edges that bounce count more than once.
+        """
         time, weights = [], []
         for passed in self._passed(response):
             rotor = passed.rotor
@@ -289,14 +294,14 @@ class PulseCircuit:
             part = self._recorded(replace(passed, rotor=certain))
             longest = LONGEST_BOUNCE * electronics.bounce_delay
             heard = max(1.0 - electronics.dead_time / longest, 0.0)
-            bounces = electronics.bounce_probability * heard
+            bounced = electronics.bounce_probability * heard if bounces else 0.0
             lost = passed.lost()
             if electronics.loss_growth > 0.0 and passed.times.size:
                 # Those that a dead time or an outage takes leave fewer edges than passed.
                 lost = np.interp(part, stamps(rotor.clock, passed.times, self._origin), lost)
             time.append(part)
             weights.append(
-                np.full(part.size, (1.0 - lost + bounces) / rotor.pulses_per_revolution)
+                np.full(part.size, (1.0 - lost + bounced) / rotor.pulses_per_revolution)
             )
         return Pulses(np.concatenate(time), np.cumsum(np.concatenate(weights)))
 
@@ -374,9 +379,9 @@ def rotor_signals(response: Response, name: str, seed: int = 0) -> Pulses:
     return PulseCircuit(name, _origin(response), seed).signals(response)
 
 
-def expected_signals(response: Response, name: str) -> Pulses:
+def expected_signals(response: Response, name: str, bounces: bool = True) -> Pulses:
     """`PulseCircuit.expected` of one rotor in a response that begins a recording's interval."""
-    return PulseCircuit(name, _origin(response), 0).expected(response)
+    return PulseCircuit(name, _origin(response), 0).expected(response, bounces)
 
 
 def _origin(response: Response) -> int:

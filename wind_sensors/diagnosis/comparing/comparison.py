@@ -79,6 +79,9 @@ class Comparison(View):
         memory: What instruments did in `drive`; None: nothing is kept.
         repeated: Share of the reference's samples that only repeated those before them, and were
             left out.
+        debounced: Pulses without bounces of the rotors whose contacts bounce. Bounces show one by
+            one, so that the series, recorded and simulated, do without them; in the spectra and
+            statistics they stay.
     """
 
     recording: Recording
@@ -87,6 +90,7 @@ class Comparison(View):
     place: Place | None = None
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
     repeated: float = 0.0
+    debounced: Mapping[str, Pulses] = field(default_factory=dict, repr=False)
     _simulated: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
     )
@@ -94,8 +98,12 @@ class Comparison(View):
     def within(self, mask: FloatArray) -> Comparison:
         """The same comparison in the blocks of a mask only, shape (n,)."""
         masked = replace(self, mask=self.masked(mask))
-        measured = masked.observe(self.recording.pulses, self.recording.angles)
-        return replace(masked, measured=measured)
+        return masked.measuring()
+
+    def measuring(self) -> Comparison:
+        """The same comparison with what is seen of the recording."""
+        pulses, angles = self.recording.pulses, self.recording.angles
+        return replace(self, measured=self.observe(pulses, angles, self.debounced))
 
     def where_vanes_follow(self, explanations: Iterable[Simulated]) -> FloatArray:
         """Weights that are zero while a vane and one of its simulations turn round apart, (n,)."""
@@ -219,7 +227,8 @@ class Comparison(View):
         if not any(e.bounce_probability > 0.0 or e.loss_probability > 0.0 for e in electronics):
             return {}
         response = self.respond(station, (instrument,))
-        return {instrument: expected_signals(response, instrument)}
+        bounces = instrument not in self.debounced
+        return {instrument: expected_signals(response, instrument, bounces)}
 
     def _reaching(self, station: Station, instrument: str) -> tuple[str, ...]:
         """Instruments on which the signals of one depend: itself and what carries it."""

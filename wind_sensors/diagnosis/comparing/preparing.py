@@ -20,6 +20,7 @@ from wind_sensors.diagnosis.comparing.observation import (
     rate_series,
 )
 from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import without_bounces
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.comparing.spectra import quick_length
 from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
@@ -132,6 +133,7 @@ def prepare(
         place=place,
         memory=DriveMemory(drive),
         repeated=repeated,
+        debounced=_debounced(recording),
     )
     simulated, angles = comparison.signals(believed)
     turning = _where_rotors_turn(comparison, simulated)
@@ -147,7 +149,17 @@ def prepare(
     followed = where_vanes_follow(beside.values(), grid)
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
-    return replace(comparison, measured=comparison.observe(recording.pulses, recording.angles))
+    return comparison.measuring()
+
+
+def _debounced(recording: Recording) -> dict[str, Pulses]:
+    """Pulses without bounces, of rotors whose contacts bounce."""
+    found = {
+        rotor.name: without_bounces(recording.pulses[rotor.name], rotor.pulses_per_revolution)
+        for rotor in recording.station.instruments
+        if isinstance(rotor, Rotor) and rotor.name in recording.pulses
+    }
+    return {name: pulses for name, pulses in found.items() if pulses is not None}
 
 
 def _where_rotors_turn(

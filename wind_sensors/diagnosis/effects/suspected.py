@@ -35,7 +35,7 @@ PLAY = Effect(
     update=_play,
     noisy=True,
     smooths=True,
-    templates=({"play": 1.0}, {"play": 3.0}, {"play": 8.0}),
+    templates=({"play": 1.0}, {"play": 3.0}, {"play": 8.0}, {"play": 20.0}),
     confusable={
         "vane_friction": "strong wind: friction fades, play stays",
         "vane_damping": "turn the vane to and fro by hand",

@@ -36,6 +36,7 @@ from wind_sensors.diagnosis.healthy.reference_lag import lag_weights, misplaced
 from wind_sensors.diagnosis.healthy.whitening import (
     Whitener,
     form_signatures,
+    outage_signatures,
     shared_liveliness,
     trust_of,
     whitener_of,
@@ -135,6 +136,8 @@ class Searcher:
             further.append(
                 form_signatures(self.comparison, trust, self.bank.without, named.simulated)
             )
+            known = planted(self.station, named.terms)
+            further.append(outage_signatures(self.comparison, trust, known))
         signatures = np.concatenate((signatures, *further))
         added = len(signatures) - len(standing)
         standing = np.concatenate((standing, np.ones(added)))

@@ -15,9 +15,12 @@ from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, chance_of_intervals
 from wind_sensors.diagnosis.healthy.baseline import Baseline, ChannelBaseline
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
+
+LONGEST_EDGE = 15
+"""A slow turn at the edge of an outage makes no more than so many bins uncertain on either side."""
 
 SMALLEST_DEVIATION = 0.02
 """Noise of a compared series is never taken below this [m/s], per coefficient."""
@@ -179,10 +182,7 @@ def form_signatures(
         Noise-whitened differences, each of one standard deviation, shape (k, m).
     """
     n = comparison.coefficients
-    sizes = [n] * len(comparison.channels)
-    sizes += [comparison.measured.statistics[c.name].size for c in comparison.channels]
-    sizes += [comparison.measured.levels[c.name].size for c in comparison.channels]
-    starts = np.concatenate(([0], np.cumsum(sizes)))
+    starts = np.concatenate(([0], np.cumsum(_lengths(comparison))))
     frequency = spectra.cosine_frequencies(comparison.grid.n, comparison.grid.dt)[:n]
     rows: list[FloatArray] = []
 
@@ -222,6 +222,57 @@ def form_signatures(
                 only = np.where(np.arange(activity.BANDS)[:, None] == band, whitened, 0.0)
                 add(place, STATISTIC_FORM_ERROR * only.ravel())
     return np.array(rows) if rows else np.zeros((0, int(starts[-1])))
+
+
+def outage_signatures(
+    comparison: Comparison, trust: Mapping[str, Trust], station: Station
+) -> FloatArray:
+    """How a rotor's rate may be wrong where an outage begins and ends, one possibility a row.
+
+    The last pulse before it and the first after it come when they come: the simulated ones by up
+    to a turn sooner or later, and for as long one rate is that of the wind, the other nought.
+
+    Args:
+        comparison: The recording.
+        trust: Noise of each channel.
+        station: Knows the outages.
+
+    Returns:
+        Noise-whitened differences, each of one standard deviation, shape (k, m).
+    """
+    n, dt = comparison.coefficients, comparison.grid.dt
+    rows: list[FloatArray] = []
+    for k, channel in enumerate(comparison.channels):
+        rotor = station.instrument(channel.instrument)
+        if not isinstance(rotor, Rotor):
+            continue
+        t = trust[channel.name]
+        for edge in (edge for outage in rotor.outages for edge in (outage.start, outage.stop)):
+            at = int((edge - comparison.drive.elapsed) / dt)
+            if not 0 <= at < comparison.grid.n:
+                continue
+            turn = 2.0 * np.pi * rotor.calibration_distance / comparison.speed[at]
+            reach = min(int(turn / dt) + 1, LONGEST_EDGE)
+            for place in range(max(at - reach, 0), min(at + reach + 1, comparison.grid.n)):
+                wrong = np.zeros(comparison.grid.n)
+                wrong[place] = comparison.speed[place]
+                row = np.zeros(_lengths(comparison).sum())
+                part = spectra.to_cosine(comparison.masked(wrong))[:n]
+                row[k * n : (k + 1) * n] = t.slope / t.deviation * part
+                rows.append(row)
+    return np.array(rows) if rows else np.zeros((0, int(_lengths(comparison).sum())))
+
+
+def _lengths(comparison: Comparison) -> npt.NDArray[np.intp]:
+    """Numbers of coefficients, statistics and levels of each channel, in the order of a vector."""
+    seen = comparison.measured
+    names = [c.name for c in comparison.channels]
+    return np.array(
+        [comparison.coefficients] * len(names)
+        + [seen.statistics[name].size for name in names]
+        + [seen.levels[name].size for name in names],
+        dtype=np.intp,
+    )
 
 
 def _thirds(rank: FloatArray) -> list[FloatArray]:

@@ -73,9 +73,15 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     for k, f in enumerate(own):
         alone = not reached[k] & set().union(*reached[:k], *reached[k + 1 :])
         quick = f.term.effect.is_quick and f.term.interval == ALWAYS
-        own_gain = SURE_QUICK_GAIN if quick else SURE_GAIN
-        sure = f.gain > (own_gain if alone else SURE_BESIDE_GAIN)
-        if f.p > SHOWN_P and f.share < OWN_SHARE and not sure:
+        others = [other.term.effect for other in (*own[:k], *own[k + 1 :])]
+        if alone:
+            least = SURE_QUICK_GAIN if quick else SURE_GAIN
+        elif any(other.is_quick == f.term.effect.is_quick for other in others):
+            least = SURE_BESIDE_GAIN
+        else:
+            # What delays moves nothing up or down, and what moves it up delays nothing.
+            least = SURE_GAIN
+        if f.p > SHOWN_P and f.share < OWN_SHARE and f.gain <= least:
             return True
     delayed = any(f.term.effect.entrance == "clock" and f.gain > SURE_BESIDE_GAIN for f in own)
     if delayed or not set.intersection(*reached) or any(_is_counted(f) for f in own):

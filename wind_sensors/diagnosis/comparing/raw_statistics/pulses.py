@@ -15,6 +15,7 @@ from wind_sensors.station.model import Cup, Propeller
 from wind_sensors.station.signals import Pulses
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 INTERVALS = 6
 """Number of statistics of the pulse intervals."""
@@ -32,6 +33,10 @@ USUAL = 0.6
 intervals that together make less than `BETWEEN` of it are one with a bounce in it; less than
 `USUAL` beside a long one belongs to a slot in the wrong place. The median is asked for where the
 mean says that two intervals may be one, or that one may be several."""
+
+BOUNCES = 0.003
+FEWEST_TO_TELL = 200
+"""A contact bounces if this share of so many edges or more lies between two a slot apart."""
 
 LOST_TURNS = 10.0
 """In a silence of so many turns, as they are before and after it, nobody counts slots."""
@@ -71,6 +76,25 @@ def interval_statistics(
     return _interval_statistics(
         grid.seconds(pulses.time), rotor.pulses_per_revolution, direction, longest, weight, grid.dt
     )
+
+
+def without_bounces(pulses: Pulses, slots: int) -> Pulses | None:
+    """Pulses without those that lie between two others that are about one slot apart.
+
+    Args:
+        pulses: Edges, each a turn of the disc by one slot.
+        slots: Per turn.
+
+    Returns:
+        None: the contact does not bounce; a gust may squeeze an edge between two others.
+    """
+    if pulses.turns is not None or pulses.time.size < FEWEST_TO_TELL:
+        return None
+    time = np.sort(pulses.time, kind="stable")
+    bounced = np.asarray(_by_slot((time - time[0]) * 1e-9, slots)[1])
+    if np.mean(bounced) < BOUNCES:
+        return None
+    return Pulses(time[~bounced])
 
 
 def chance_of_intervals(one: FloatArray, other: FloatArray, edges: int) -> FloatArray:
@@ -133,7 +157,7 @@ def _interval_statistics(
         return out
     time = _without_a_silence(time, slots)
     out[2:] = _slot_statistics(time, slots, direction, longest, weight, dt)
-    tracked = _by_slot(time, slots)
+    tracked, _ = _by_slot(time, slots)
     if tracked.size != time.size or np.any(np.isnan(tracked)):
         # Of two ways to number the slots, the wrong one makes them look more alike.
         other = _slot_statistics(tracked, slots, direction, longest, weight, dt)
@@ -168,7 +192,7 @@ def _without_a_silence(time: FloatArray, slots: int) -> FloatArray:
 
 
 @compiled
-def _by_slot(time: FloatArray, slots: int) -> FloatArray:
+def _by_slot(time: FloatArray, slots: int) -> tuple[FloatArray, BoolArray]:
     """Edges in the order of the disc's slots: without bounces, NaN where one was missed.
 
     An edge between two others that are about one slot apart bounced; where two are about a whole
@@ -178,10 +202,14 @@ def _by_slot(time: FloatArray, slots: int) -> FloatArray:
     Args:
         time: Edges [s], shape (n,).
         slots: Per turn.
+
+    Returns:
+        Times of the slots, shape (m,), and which of the edges bounced, shape (n,).
     """
     edges = time.size
     half = max(NEIGHBOURS, slots) // 2 + 1
     found = np.full(2 * edges, np.nan)
+    bounced = np.zeros(edges, dtype=np.bool_)
     found[0] = time[0]
     place = 0
     last = 0
@@ -197,6 +225,7 @@ def _by_slot(time: FloatArray, slots: int) -> FloatArray:
             # A mean is wrong where several edges bounced or were missed; a median takes time.
             usual = max(float(np.median(np.diff(around))), 1e-9)
             if both < BETWEEN * usual:
+                bounced[i] = True
                 continue
             after = both - own
             if i + 2 < edges and time[i + 2] - time[i] < BETWEEN * usual:
@@ -210,7 +239,7 @@ def _by_slot(time: FloatArray, slots: int) -> FloatArray:
         last = i
         before = own
     found[place + 1] = time[edges - 1]
-    return found[: place + 2]
+    return found[: place + 2], bounced
 
 
 @compiled
@@ -350,7 +379,7 @@ def slot_intervals(time: FloatArray, slots: int) -> SlotIntervals:
     """
     plain, tracked = (
         SlotIntervals(*_deviations(edges, slots), slots)
-        for edges in (time, np.asarray(_by_slot(time, slots)))
+        for edges in (time, _by_slot(time, slots)[0])
     )
     return tracked if np.var(tracked.means()) > np.var(plain.means()) else plain
 
