@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -102,6 +104,12 @@ class Searcher:
         """The station as commissioned."""
         return self.baseline.station
 
+    @cached_property
+    def falling_silent(self) -> Station:
+        """The station with the outages that its signals tell."""
+        told = (terms for key, terms in self.guesses.items() if key[0] == "stuck_sensor")
+        return planted(self.station, list(chain.from_iterable(told)))
+
     def whitener(self, simulated: Simulated, named: Fit | None = None) -> Whitener:
         """The null seen from the best simulation so far.
 
@@ -131,13 +139,11 @@ class Searcher:
         way = self.misplaced * self.comparison.weights(trust)
         lag = np.concatenate((lag_weights(self.comparison, templates) @ signatures, way))
         lively = shared_liveliness(self.comparison, trust, self.baseline.liveliness)
-        further = [lag, lively]
+        further = [lag, lively, outage_signatures(self.comparison, trust, self.falling_silent)]
         if named is not None:
             further.append(
                 form_signatures(self.comparison, trust, self.bank.without, named.simulated)
             )
-            known = planted(self.station, named.terms)
-            further.append(outage_signatures(self.comparison, trust, known))
         signatures = np.concatenate((signatures, *further))
         added = len(signatures) - len(standing)
         standing = np.concatenate((standing, np.ones(added)))
