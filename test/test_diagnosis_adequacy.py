@@ -252,6 +252,8 @@ SLOW = ("low_pass_filter", "vane")
         ((OFFSET, LATE), (60.0, 25.0), (0.002, 0.4), True),
         ((SLOW, LATE), (100.0, 90.0), (0.002, 0.002), True),
         ((SLOW, LATE), (100.0, 110.0), (0.002, 0.002), False),
+        ((TURNED, LATE), (60.0, 55.0), (0.002, 0.4), False),
+        ((TURNED, LATE), (60.0, 45.0), (0.002, 0.4), True),
         ((OFFSET,), (100.0,), (0.4,), False),
     ],
 )

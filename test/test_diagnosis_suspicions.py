@@ -28,15 +28,16 @@ def _behind_play(recording: Recording, play_deg: float) -> Recording:
     return replace(recording, angles={"vane": Angles(vane.time, np.angle(np.exp(1j * shaft)))})
 
 
-def test_play_is_no_friction_though_both_hold_the_reading_still() -> None:
-    found = diagnose(_behind_play(recorded(STATION, 66), 14.0), baseline())
+@pytest.mark.parametrize("play_deg", [14.0, 28.0])
+def test_play_is_no_friction_though_both_hold_the_reading_still(play_deg: float) -> None:
+    found = diagnose(_behind_play(recorded(STATION, 66), play_deg), baseline())
     assert found.verdict == "unknown"
     assert found.findings == ()
     assert "play between vane and sensor" in found.unexplained.description
     suspicion = suspicion_of(found.naming, STATION)
     assert suspicion is not None
     assert suspicion.fault.effect.name == "play"
-    assert suspicion.fault.values["play"] == pytest.approx(14.0, rel=0.1)
+    assert suspicion.fault.values["play"] == pytest.approx(play_deg, rel=0.1)
 
 
 def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings() -> None:
