@@ -45,6 +45,7 @@ from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.diagnosis.proving.contradictions import undo_each_other, varies
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Station
+from wind_sensors.station.signals import Angles, Recording
 
 SLOW = Station.model_validate(
     {
@@ -161,6 +162,30 @@ def test_few_fine_readings_hide_no_coarse_ones() -> None:
     (term,) = guesses_of(prepare(recorded(station, 76)), STATION)[("quantisation", "vane")]
     assert term.values["step"] == pytest.approx(8.0, abs=0.01)
     assert term.interval[0] == pytest.approx(60.0, abs=3.0)
+
+
+def _read(angle: np.ndarray, seed: int) -> Recording:
+    """A recording of the mast whose vane reads these angles [rad]."""
+    recording = recorded(STATION, seed)
+    vane = recording.angles["vane"]
+    return replace(recording, angles={"vane": Angles(vane.time, angle)})
+
+
+def test_readings_that_repeat_here_and_there_are_not_coarse() -> None:
+    angle = recorded(STATION, 71).angles["vane"].angle.copy()
+    angle[::5] = np.resize(np.radians([10.0, 20.0, 30.0, 40.0]), angle[::5].size)
+    assert ("quantisation", "vane") not in guesses_of(prepare(_read(angle, 71)), STATION)
+
+
+def test_a_wiper_that_floats_in_a_gap_interrupts_no_steps() -> None:
+    angle = recorded(STATION, 71, swing=0.8).angles["vane"].angle
+    coarse = np.radians(6.0) * np.round(angle / np.radians(6.0))
+    gap = np.abs(np.angle(np.exp(1j * (angle - np.median(angle))))) < np.radians(5.0)
+    drawn = np.random.default_rng(1).uniform(-np.pi, np.pi, angle.size)
+    seen = prepare(_read(np.where(gap, drawn, coarse), 71))
+    (term,) = guesses_of(seen, STATION)[("quantisation", "vane")]
+    assert term.values["step"] == pytest.approx(6.0, abs=0.01)
+    assert term.interval == ALWAYS
 
 
 def test_coarse_steps_are_not_tried_on_readings_that_have_none() -> None:

@@ -216,10 +216,19 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
     further = longer.terms[-1]
     if not acts_beside(searcher, further, current.terms) or further.is_told:
         return 0.0
-    if further.relative_size < SMALLEST_BESIDE or is_its_moment(searcher, current, further):
+    small = further.relative_size < SMALLEST_BESIDE
+    if small and not _brings_most(searcher, whitener, current, longer):
+        return np.inf
+    if is_its_moment(searcher, current, further):
         return np.inf
     own = times_beside(further) * inexact(searcher, whitener, current, longer)
     return max(own, LEAST_BESIDE_GAIN)
+
+
+def _brings_most(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> bool:
+    """Whether a further term brings more than all before it: then it mends the form of none."""
+    nothing = whitener.of(searcher.bank.without)
+    return current.cost - longer.cost > float(nothing @ nothing) - current.cost
 
 
 def acts_beside(searcher: Searcher, further: Term, terms: Sequence[Term]) -> bool:

@@ -42,14 +42,15 @@ REPEATED = 6.0
 LEAST_REPEATS = 20
 FEWEST_STEPS = 3
 SMOOTHED_READINGS = 101
+ON_A_STEP = 0.01
 SHORTEST_COARSE = 60.0
 ON_STEPS = 0.9
 FEWEST_VISITS = 2.0
 WIDEST_STEP = 45.0
 """Readings that come so many times as often as others, and so often, are coarse: at least three
 different ones, most of so many readings in a row, for so long [s]; they lie on steps of no more
-[deg] (mean vector of their remainders), and the vane comes back to them: one that sticks stands
-where it happened to.
+[deg] (mean vector of their remainders; each within so much [deg] of one), and the vane comes back
+to them: one that sticks stands where it happened to.
 """
 
 
@@ -172,12 +173,10 @@ def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
     repeated = counts > max(REPEATED * degrees.size / values.size, LEAST_REPEATS)
     if np.count_nonzero(repeated) < FEWEST_STEPS:
         return []
-    coarse = repeated[place]
-    usual = uniform_filter1d(coarse.astype(np.float64), SMOOTHED_READINGS) > 0.5
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], usual, [False])).astype(np.int8)))
-    begin, end = max(
-        zip(edges[::2], edges[1::2], strict=True), key=lambda run: float(run[1] - run[0])
-    )
+    # A wiper that floats in a gap interrupts no steps.
+    steady = ~erratic(readings)[told]
+    degrees, time, coarse = degrees[steady], time[steady], repeated[place][steady]
+    begin, end = _longest_run(coarse)
     inside = np.unique(degrees[begin:end][coarse[begin:end]])
     if inside.size < FEWEST_STEPS or time[end - 1] - time[begin] < SHORTEST_COARSE:
         return []
@@ -187,8 +186,19 @@ def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
         return []
     turns = np.exp(2j * np.pi * inside / step)
     origin = float(np.angle(np.mean(turns))) * step / (2.0 * np.pi)
+    # Headings that the vane seldom has repeat seldom, but lie on steps like the others.
+    beside = np.mod(degrees - origin + 0.5 * step, step) - 0.5 * step
+    begin, end = _longest_run(np.abs(beside) < ON_A_STEP)
     holds = interval_of(comparison, float(time[begin]), float(time[end - 1]))
     return [replace(suggested("quantisation", vane, step=step, origin=origin), interval=holds)]
+
+
+def _longest_run(holds: BoolArray) -> tuple[int, int]:
+    """Beginning and end of the longest stretch of readings of which most are so; (0, 0): none."""
+    usual = uniform_filter1d(holds.astype(np.float64), SMOOTHED_READINGS) > 0.5
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], usual, [False])).astype(np.int8)))
+    runs = [(0, 0), *zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
+    return max(runs, key=lambda run: run[1] - run[0])
 
 
 def _are_steps(values: npt.NDArray[np.floating[Any]], step: float) -> bool:
