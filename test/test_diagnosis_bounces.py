@@ -48,6 +48,16 @@ def test_no_edge_is_taken_from_a_contact_that_does_not_bounce(seed: int):
     assert without_bounces(recorded(STATION, seed).pulses["cup"], 12) is None
 
 
+@pytest.mark.parametrize("pause", [0.3, 0.8])
+def test_edges_that_a_logger_stamps_late_in_lots_are_no_bounces(pause: float):
+    time = recorded(STATION, 0).pulses["cup"].time
+    since = 1e-9 * time
+    begun = 10.0 * np.floor(since / 10.0)
+    late = since - begun < pause
+    stamped = np.where(late, 1e9 * (begun + pause) + 2000.0 * (np.arange(time.size) % 50), time)
+    assert without_bounces(Pulses(np.sort(stamped.astype(np.int64))), 12) is None
+
+
 def _said(found: Diagnosis) -> set[str]:
     return {finding.term.effect.name for finding in found.findings}
 

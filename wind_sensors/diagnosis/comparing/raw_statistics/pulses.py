@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import median_filter
 
 from wind_sensors.compiled import compiled
 from wind_sensors.diagnosis.comparing.observation import Grid
@@ -37,6 +38,11 @@ mean says that two intervals may be one, or that one may be several."""
 BOUNCES = 0.003
 FEWEST_TO_TELL = 200
 """A contact bounces if this share of so many edges or more lies between two a slot apart."""
+
+MADE_UP_FOR = 0.5
+LONGEST_WAIT = 5.0
+"""But not if for this share of those that lie too close or more edges are missing elsewhere, in
+gaps of no more than so many seconds."""
 
 LOST_TURNS = 10.0
 """In a silence of so many turns, as they are before and after it, nobody counts slots."""
@@ -86,7 +92,8 @@ def without_bounces(pulses: Pulses, slots: int) -> Pulses | None:
         slots: Per turn.
 
     Returns:
-        None: the contact does not bounce; a gust may squeeze an edge between two others.
+        None: the contact does not bounce. A gust may squeeze an edge between two others, and a
+        logger that stamps late, in lots, many; but then they are missing before.
     """
     if pulses.turns is not None or pulses.time.size < FEWEST_TO_TELL:
         return None
@@ -94,7 +101,13 @@ def without_bounces(pulses: Pulses, slots: int) -> Pulses | None:
     bounced = np.asarray(_by_slot((time - time[0]) * 1e-9, slots)[1])
     if np.mean(bounced) < BOUNCES:
         return None
-    return Pulses(time[~bounced])
+    kept = time[~bounced]
+    interval = np.diff(kept) * 1e-9
+    usual = np.maximum(median_filter(interval, NEIGHBOURS + 1), 1e-9)
+    waits = (interval > LONG * usual) & (interval < LONGEST_WAIT)
+    if np.sum(interval[waits] / usual[waits] - 1.0) > MADE_UP_FOR * np.count_nonzero(bounced):
+        return None
+    return Pulses(kept)
 
 
 def chance_of_intervals(one: FloatArray, other: FloatArray, edges: int) -> FloatArray:
