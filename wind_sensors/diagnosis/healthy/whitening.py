@@ -241,6 +241,7 @@ def outage_signatures(
         Noise-whitened differences, each of one standard deviation, shape (k, m).
     """
     n, dt = comparison.coefficients, comparison.grid.dt
+    length = int(_lengths(comparison).sum())
     rows: list[FloatArray] = []
     for k, channel in enumerate(comparison.channels):
         rotor = station.instrument(channel.instrument)
@@ -256,11 +257,11 @@ def outage_signatures(
             for place in range(max(at - reach, 0), min(at + reach + 1, comparison.grid.n)):
                 wrong = np.zeros(comparison.grid.n)
                 wrong[place] = comparison.speed[place]
-                row = np.zeros(_lengths(comparison).sum())
+                row = np.zeros(length)
                 part = spectra.to_cosine(comparison.masked(wrong))[:n]
                 row[k * n : (k + 1) * n] = t.slope / t.deviation * part
                 rows.append(row)
-    return np.array(rows) if rows else np.zeros((0, int(_lengths(comparison).sum())))
+    return np.array(rows) if rows else np.zeros((0, length))
 
 
 def _lengths(comparison: Comparison) -> npt.NDArray[np.intp]:
