@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,13 +78,26 @@ def test_a_new_version_takes_the_page_and_the_old_one_is_kept(tmp_path: Path) ->
     drawn = publish(page, [scored(tmp_path / "two", "two", [case("a", [], [])] * 2)])
     after = page.read_text()
     assert "| a name in a healthy recording | 0.0 % (0/2) |" in after
-    assert "| what | one | two | together | promised |" in after
+    assert "| what | one | two | newest 2 together | promised |" in after
     # One of three: Clopper and Pearson's interval from tables.
     row = "| a name in a healthy recording | 100 % (1/1) | 0 % (0/2) | 33 % (1/3), 1 to 91 % |"
     assert row in after
     assert all(path.stat().st_size for path in drawn)
     publish(page, [])
     assert page.read_text() == after
+
+
+def test_how_large_an_effect_must_be_is_told_from_several_sets_together(tmp_path: Path) -> None:
+    page = tmp_path / "proof.md"
+    page.write_text("<!-- numbers: doses -->\n<!-- end -->\n")
+    turned = case("a", ["vane_offset"], ["vane_offset"])
+    small = [replace(turned, size=1.0, outcome="none", verdict="none", named=())] * 2
+    publish(page, [scored(tmp_path / "one", "one", small)])
+    assert "vane_offset" not in page.read_text()
+    drawn = publish(page, [scored(tmp_path / "two", "two", [turned] * 2)])
+    (row,) = re.findall(r"\| vane_offset \| (\S+) .*\| 4 \|", page.read_text())
+    assert 1.0 < float(row) < 3.0
+    assert [path.name for path in drawn][-1] == "proof_doses.png"
 
 
 def test_a_page_that_asks_for_what_nobody_counts_is_told_so(tmp_path: Path) -> None:

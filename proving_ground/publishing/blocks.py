@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from proving_ground.minimum_sizes import MINIMUM_SIZES
@@ -34,6 +33,8 @@ FILES = (SCORE, ORACLE, TWINS, PEERS, REAL)
 EARLIER = "earlier"
 VERSIONS = 8
 """So many of the newest versions stand beside each other on the page; all of them are kept."""
+TOGETHER = 15
+"""So many of the newest sets are counted together: one of sixty holds an effect once or twice."""
 
 MISSING = "Not measured yet."
 PARTS = (
@@ -51,7 +52,7 @@ def blocks(folder: Path) -> dict[str, str]:
         found["about"] = about_lines(card)
         found["rates"] = rate_lines(card)
         found["strata"] = stratum_lines(card)
-        found["doses"] = dose_lines(card)
+        found["doses"] = dose_lines(together(cards))
         found["coverage"] = coverage_lines(card)
         found["failures"] = failure_lines(card)
     if (folder / ORACLE).is_file():
@@ -79,6 +80,12 @@ def cards_of(folder: Path) -> list[tuple[str, Card]]:
     return [(str(card.about.get("version", path.stem)), card) for path, card in cards]
 
 
+def together(cards: Sequence[tuple[str, Card]]) -> Card:
+    """One card of the recordings of the newest sets."""
+    newest = [card for _, card in cards[-TOGETHER:]]
+    return Card({"sets": len(newest)}, tuple(j for card in newest for j in card.judged))
+
+
 def size_lines() -> list[str]:
     """The smallest sizes worth reporting as a table."""
     lines = ["| effect | smallest | of what | stations |", "|---|---|---|---|"]
@@ -89,15 +96,17 @@ def size_lines() -> list[str]:
 
 
 def version_lines(cards: Sequence[tuple[str, Card]]) -> list[str]:
-    """The promised rates of the newest versions, one by one and together, as a table."""
+    """The promised rates of the newest versions one by one, and of more together, as a table."""
     if not cards:
         return [MISSING]
     newest = cards[-VERSIONS:]
     names = " | ".join(name for name, _ in newest)
-    lines = [f"| what | {names} | together | promised |", "|---" * (len(newest) + 3) + "|"]
-    for rows in zip(*(card.rates for _, card in newest), strict=True):
-        told = " | ".join(map(_brief, rows))
-        lines.append(f"| {rows[0].title} | {told} | {_together(rows)} | {rows[-1].promised} |")
+    pooled = together(cards)
+    last = f"newest {pooled.about['sets']} together"
+    lines = [f"| what | {names} | {last} | promised |", "|---" * (len(newest) + 3) + "|"]
+    for *each, all_sets in zip(*(card.rates for _, card in newest), pooled.rates, strict=True):
+        told = " | ".join([*map(_brief, each), _with_interval(all_sets), all_sets.promised])
+        lines.append(f"| {all_sets.title} | {told} |")
     return lines
 
 
@@ -105,11 +114,8 @@ def _brief(rate: Rate) -> str:
     return f"{100 * rate.value:.0f} % ({rate.hits}/{rate.total})" if rate.total else ""
 
 
-def _together(rates: Sequence[Rate]) -> str:
-    """The rate in these sets taken together, with its interval."""
-    hits, total = sum(r.hits for r in rates), sum(r.total for r in rates)
-    rate = replace(rates[-1], hits=hits, total=total)
-    if not total:
+def _with_interval(rate: Rate) -> str:
+    if not rate.total:
         return ""
     low, high = rate.interval
     return f"{_brief(rate)}, {100 * low:.0f} to {100 * high:.0f} %"

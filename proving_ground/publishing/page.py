@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from proving_ground.publishing.blocks import EARLIER, FILES, blocks
+from proving_ground.publishing.blocks import EARLIER, FILES, blocks, cards_of, together
 from proving_ground.scoring.card import NUMBERS, read_card
 from proving_ground.scoring.figures import draw_confusion, draw_doses, draw_rates
 from wind_sensors.errors import UserError
@@ -75,15 +75,15 @@ def _keep_earlier(before: Path, now: Path) -> None:
 
 
 def _draw(folder: Path, figures: Path) -> list[Path]:
-    numbers = folder / NUMBERS
-    if not numbers.is_file():
+    cards = cards_of(folder)
+    if not (folder / NUMBERS).is_file():
         return []
-    card = read_card(numbers)
+    newest, pooled = cards[-1][1], together(cards)
     figures.mkdir(exist_ok=True)
     drawn = [figures / "proof_rates.png", figures / "proof_confusion.png"]
-    draw_rates(card.rates, drawn[0])
-    draw_confusion(card.judged, drawn[1])
-    if card.doses:
+    draw_rates(newest.rates, drawn[0], pooled.rates)
+    draw_confusion(pooled.judged, drawn[1])
+    if pooled.doses:
         drawn.append(figures / "proof_doses.png")
-        draw_doses(card.doses, drawn[2])
+        draw_doses(pooled.doses, drawn[2])
     return drawn

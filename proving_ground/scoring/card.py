@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,23 +27,26 @@ NUMBERS = "score.json"
 
 @dataclass(frozen=True)
 class Card:
-    """The scores of one set: what they are of, every recording, the promised rates, the curves."""
+    """The scores of one set, or of several: what they are of, and every recording."""
 
     about: dict[str, Any]
     judged: tuple[Judged, ...]
-    rates: tuple[Rate, ...]
-    doses: tuple[Dose, ...]
 
+    @cached_property
+    def rates(self) -> tuple[Rate, ...]:
+        """The promised rates."""
+        return tuple(promised_rates(self.judged))
 
-def card_of(judged: Sequence[Judged], about: dict[str, Any]) -> Card:
-    """Count and fit what is told of a set."""
-    return Card(about, tuple(judged), tuple(promised_rates(judged)), tuple(_doses(judged)))
+    @cached_property
+    def doses(self) -> tuple[Dose, ...]:
+        """Chance of a find against size: of all effects, then of each, the easiest first."""
+        return tuple(_doses(self.judged))
 
 
 def write_card(folder: Path, judged: Sequence[Judged], about: dict[str, Any]) -> list[Rate]:
     """Write the card, its figures and its numbers into a folder; the promised rates."""
     folder.mkdir(parents=True, exist_ok=True)
-    card = card_of(judged, about)
+    card = Card(about, tuple(judged))
     if judged:
         draw_rates(card.rates, folder / "rates.png")
         draw_confusion(judged, folder / "confusion.png")
@@ -71,15 +75,16 @@ def read_card(file: Path) -> Card:
         raise UserError(
             "this is no score card", str(file), "`wind prove open` writes one."
         ) from None
-    return card_of(judged, numbers["about"])
+    return Card(numbers["about"], tuple(judged))
 
 
 def _doses(judged: Sequence[Judged]) -> list[Dose]:
     singles = [j for j in judged if j.stratum == "single"]
     names = sorted({j.truth[0] for j in singles})
-    curves = [dose_response("all effects", singles)]
-    curves += [dose_response(n, [j for j in singles if j.truth == (n,)]) for n in names]
-    return [c for c in curves if c is not None]
+    together = dose_response("all effects", singles)
+    curves = [dose_response(n, [j for j in singles if j.truth == (n,)]) for n in names]
+    each = sorted((c for c in curves if c is not None), key=lambda c: c.half)
+    return [] if together is None else [together, *each]
 
 
 def _page(card: Card) -> str:

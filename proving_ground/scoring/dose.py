@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.special import expit
 
 from proving_ground.inflow import Array
 from proving_ground.scoring.outcome import Judged
 
 RESAMPLES = 300
+FEWEST = 4
+"""Of fewer cases no curve is told."""
 
 
 @dataclass(frozen=True)
@@ -39,21 +42,27 @@ def fit_logistic(size: Array, found: Array) -> tuple[float, float]:
     """Slope and middle (logarithm of size) of a logistic curve, weakly held to sane values."""
     dose = np.log(size)
 
-    def cost(parameters: Array) -> float:
+    def cost(parameters: Array) -> tuple[float, Array]:
         log_slope, middle = parameters
-        score = np.exp(log_slope) * (dose - middle)
+        slope = np.exp(log_slope)
+        score = slope * (dose - middle)
         likelihood = np.sum(found * score - np.logaddexp(0.0, score))
         prior = 0.5 * ((log_slope - 0.7) / 0.7) ** 2 + 0.5 * ((middle - 0.5) / 1.5) ** 2
-        return float(prior - likelihood)
+        missed = found - expit(score)
+        gradient = [
+            (log_slope - 0.7) / 0.7**2 - np.sum(missed * score),
+            (middle - 0.5) / 1.5**2 + slope * np.sum(missed),
+        ]
+        return float(prior - likelihood), np.array(gradient)
 
-    best = minimize(cost, [0.7, 0.5], method="Nelder-Mead")
+    best = minimize(cost, [0.7, 0.5], jac=True, method="BFGS", options={"gtol": 1e-8})
     return float(np.exp(best.x[0])), float(best.x[1])
 
 
 def dose_response(title: str, judged: Sequence[Judged], seed: int = 0) -> Dose | None:
-    """Curve of the single effects among `judged`; None where there are fewer than four."""
+    """Curve of the single effects among `judged`; None of too few cases, or of one size only."""
     cases = [j for j in judged if j.stratum == "single" and j.size > 0.0]
-    if len(cases) < 4:
+    if len(cases) < FEWEST or len({j.size for j in cases}) == 1:
         return None
     size = np.array([j.size for j in cases])
     found = np.array([float(j.found) for j in cases])

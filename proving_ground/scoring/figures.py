@@ -69,11 +69,12 @@ def draw_confusion(judged: Sequence[Judged], path: Path) -> None:
 
 
 def draw_doses(doses: Sequence[Dose], path: Path) -> None:
-    """Chance of a find against size, one panel for each curve, counts with their intervals."""
-    columns = min(4, len(doses))
+    """Chance of a find against size, one panel for each curve with the number of its cases; shares
+    with their intervals."""
+    columns = min(5, len(doses))
     lines = -(-len(doses) // columns)
     figure = Figure(figsize=(0.8 + 3.2 * columns, 0.6 + 2.2 * lines), layout="constrained")
-    size = np.geomspace(0.4, 8.0, 80)
+    size = np.geomspace(0.4, 15.0, 80)
     for i, dose in enumerate(doses):
         axes = figure.add_subplot(lines, columns, i + 1)
         axes.plot(size, dose.chance(size), color=NEUTRAL)
@@ -82,20 +83,22 @@ def draw_doses(doses: Sequence[Dose], path: Path) -> None:
             axes.plot([level, level], [low, high], color="0.6", linewidth=1.0)
             axes.plot(level, finds / trials, "o", color=NEUTRAL, markersize=3.5)
         axes.set_xscale("log")
-        axes.set_xticks([0.5, 1, 2, 3, 6], ["½", "1", "2", "3", "6"], fontsize=7)
+        axes.set_xticks([0.5, 1, 3, 6, 12], ["½", "1", "3", "6", "12"], fontsize=7)
         axes.xaxis.set_minor_locator(mpl.ticker.NullLocator())
         axes.set_yticks([0.0, 0.5, 1.0], ["0", "½", "1"], fontsize=7)
         axes.set_ylim(-0.05, 1.05)
-        axes.set_title(dose.title, fontsize=8)
+        axes.set_title(f"{dose.title} ({sum(dose.trials)})", fontsize=8)
         axes.grid(alpha=0.25)
     figure.supxlabel("size in multiples of the smallest worth reporting", fontsize=8)
     figure.supylabel("share found", fontsize=8)
     _save(figure, path)
 
 
-def draw_rates(rates: Sequence[Rate], path: Path) -> None:
-    """Rates with their intervals beside what was promised."""
+def draw_rates(rates: Sequence[Rate], path: Path, together: Sequence[Rate] = ()) -> None:
+    """Rates with their intervals beside what was promised; below each the same rate of several
+    sets together, where it is given."""
     shown = [r for r in rates if r.total]
+    pooled = {r.title: r for r in together}
     figure = Figure(figsize=(8.6, 0.8 + 0.42 * len(shown)))
     axes = figure.add_subplot()
     for i, one in enumerate(reversed(shown)):
@@ -105,12 +108,20 @@ def draw_rates(rates: Sequence[Rate], path: Path) -> None:
             colour = KEPT
         axes.plot([low, high], [i, i], color=colour, linewidth=2.0)
         axes.plot(one.value, i, "o", color=colour)
+        if one.title in pooled:
+            all_sets = pooled[one.title]
+            low, high = all_sets.interval
+            axes.plot([low, high], [i - 0.25, i - 0.25], color="0.55", linewidth=1.2)
+            axes.plot(all_sets.value, i - 0.25, "o", color="0.55", markersize=3.5)
         for promise in (one.at_least, one.at_most):
             if promise is not None:
                 axes.plot([promise, promise], [i - 0.3, i + 0.3], color="black", linewidth=1.5)
     axes.set_yticks(range(len(shown)), [r.title for r in reversed(shown)], fontsize=8)
     axes.set_xlim(-0.02, 1.02)
-    axes.set_xlabel("rate, with its 95 % interval; bars: promised")
+    axes.set_xlabel(
+        "rate, with its 95 % interval; bars: promised"
+        + ("; grey: several sets together" if together else "")
+    )
     axes.grid(axis="x", alpha=0.25)
     _save(figure, path)
 
