@@ -132,6 +132,7 @@ SOFT_FIN = Effect(
         "vane_inertia": "a release test in weak wind and in strong wind",
         "vane_damping": "a release test in weak wind and in strong wind",
         "low_pass_filter": "bend the fin by hand; a release test in weak wind",
+        "air_density": "a barometer; a release test in weak wind",
     },
 )
 

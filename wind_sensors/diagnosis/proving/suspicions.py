@@ -121,14 +121,12 @@ def _in_place_of(term: Term, station: Station) -> list[Trial]:
     heading at which it catches when the wind has turned.
     """
     return [
-        Trial(term, Term(fault, term.instrument, dict(values), interval))
+        Trial(term, Term(fault, entry, dict(values), interval))
         for fault in SUSPECTS
         for interval in dict.fromkeys((term.interval, ALWAYS))
         if term.effect.name in fault.confusable
-        and any(
-            fault.applies(entry_of(station, entry), station)
-            for entry in touched(station, fault, term.instrument)
-        )
+        for entry in touched(station, fault, term.instrument)
+        if fault.applies(entry_of(station, entry), station)
         for values in fault.templates
     ]
 
