@@ -30,17 +30,23 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     "platform_velocity": MinimumSize(
         1.0, "1", "share of the platform's velocity missing from its odometry", "B", False
     ),
-    "platform_velocity_scale": MinimumSize(0.08, "1", "error of scale of the velocity", "B"),
+    "platform_velocity_scale": MinimumSize(
+        0.08, "1", "error of scale of the velocity", "B", most=6.0
+    ),
     "lever_arm": MinimumSize(1.0, "m", "error of the sensor's place", "B"),
     "heading_deviation": MinimumSize(3.0, "deg", "compass deviation, once a turn", "B"),
-    "frame_error": MinimumSize(8.0, "deg", "turn of the velocity's frame", "B"),
+    "frame_error": MinimumSize(
+        8.0, "deg", "turn of the velocity's frame", "B", most=11.25
+    ),
     "rotor_downwash": MinimumSize(0.8, "m/s", "downward jet in a calm", "B"),
     "calibration_drift": MinimumSize(0.01, "1", "change of the indicated speed"),
     "calibration_offset": MinimumSize(0.12, "m/s", "loss of speed at every wind"),
     "bearing_friction": MinimumSize(0.12, "m/s", "loss of speed at 5 m/s"),
     "air_density": MinimumSize(0.12, "1", "logarithm of the loss of density", most=6.0),
     "rotor_inertia": MinimumSize(0.5, "1", "growth of the moment of inertia"),
-    "torque_asymmetry": MinimumSize(0.25, "1", "growth of the torque while speeding up"),
+    "torque_asymmetry": MinimumSize(
+        0.25, "1", "growth of the torque while speeding up", most=3.6
+    ),
     "damaged_cup": MinimumSize(0.03, "1", "loss of force on one cup or blade"),
     "angular_response": MinimumSize(0.12, "1", "change of the response to a tilted wind"),
     "icing": MinimumSize(0.012, "1", "loss of speed by ice, with the mass that goes with it"),

@@ -72,6 +72,23 @@ def apart(one: Signals, other: Signals) -> float:
     return max(float(np.max(np.abs(a - b))) for a, b in pairs)
 
 
+@pytest.mark.parametrize("effect", [n for n, size in MINIMUM_SIZES.items() if size.graded])
+def test_the_largest_size_is_planted_as_large_as_it_says(
+    stations: dict[str, Station], effect: str
+) -> None:
+    largest = MINIMUM_SIZES[effect]
+    station = next(s for kind, s in stations.items() if kind in largest.kinds)
+
+    def planted(size: float) -> object:
+        # As long as a sealed recording: a signal stands still for a part of it at most.
+        scene = build_scene(station, with_effect(station, (), 0.0, 3, 15.0).weather, 15.0, 3)
+        return cause(effect).plant(scene, largest.value * size, np.ones(scene.time.size))
+
+    # Steps of a reading divide the turn: the next smaller ones are a good deal smaller.
+    less = 0.8 if effect == "quantisation" else 0.97
+    assert planted(largest.most) != planted(less * largest.most)
+
+
 def test_a_frictionless_rotor_turns_in_proportion_to_the_wind(
     stations: dict[str, Station],
 ) -> None:

@@ -87,11 +87,13 @@ def together(cards: Sequence[tuple[str, Card]]) -> Card:
 
 
 def size_lines() -> list[str]:
-    """The smallest sizes worth reporting as a table."""
-    lines = ["| effect | smallest | of what | stations |", "|---|---|---|---|"]
+    """The smallest sizes worth reporting, and the largest that are planted, as a table."""
+    lines = ["| effect | smallest | largest | of what | stations |", "|---|---|---|---|---|"]
     for name, size in MINIMUM_SIZES.items():
         unit = "" if size.unit == "1" else f" {size.unit}"
-        lines.append(f"| `{name}` | {size.value:g}{unit} | {size.meaning} | {size.kinds} |")
+        largest = f"{size.value * size.most:.3g}{unit}" if size.graded else ""
+        least = f"{size.value:g}{unit}"
+        lines.append(f"| `{name}` | {least} | {largest} | {size.meaning} | {size.kinds} |")
     return lines
 
 
