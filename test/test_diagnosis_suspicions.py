@@ -9,7 +9,7 @@ import pytest
 from diagnosis_cases import STATION, baseline, diagnosed, recorded
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import with_keys
+from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit
 from wind_sensors.diagnosis.proving.suspicions import suspicion_of
@@ -87,6 +87,38 @@ def test_a_fin_that_gives_way_is_no_thin_air() -> None:
     assert suspicion is not None
     assert suspicion.effect == "air_density"
     assert suspicion.fault.key == ("soft_fin", "vane")
+
+
+def _with_shaded_reference(recording: Recording, depth: float, turn: float) -> Recording:
+    """The recording by a sonic whose arms shade its paths: three dips a turn, a cosine's power."""
+    assert recording.reference is not None
+    velocity = recording.reference.velocity
+    heading = np.arctan2(velocity[:, 1], velocity[:, 0]) - turn
+    loss = depth * np.abs(np.cos(1.5 * heading)) ** 6
+    seen = replace(recording.reference, velocity=velocity * (1.0 - loss)[:, None])
+    return replace(recording, reference=seen)
+
+
+def test_the_shadow_of_the_references_arms_is_no_distorted_flow() -> None:
+    shaded = _with_shaded_reference(recorded(STATION, 69, swing=0.5), 0.1, 0.3)
+    naming = diagnose(shaded, baseline(), with_proof=False).naming
+    flow = {"cosine_1": 0.02, "sine_1": 0.0, "cosine_2": 0.02, "sine_2": 0.0, "deflection": 0.0}
+    distorted = Term(catalogue()["flow_distortion"], "station", flow)
+    suspicion = suspicion_of(
+        replace(naming, fit=fit(naming.whitener, STATION, [distorted])), STATION
+    )
+    assert suspicion is not None
+    assert suspicion.fault.key == ("reference_shadow", "station")
+    assert suspicion.fault.values["depth"] == pytest.approx(0.1, abs=0.03)
+    assert "three arms" in suspicion.words
+
+
+def test_a_distorted_flow_keeps_its_name_beside_it() -> None:
+    flow = {"cosine_1": 0.06, "sine_1": -0.04, "cosine_2": 0.03, "sine_2": 0.0, "deflection": 1.0}
+    distorted = with_effect(STATION, catalogue()["flow_distortion"], "station", flow)
+    found = diagnose(recorded(distorted, 70, swing=0.5), baseline())
+    assert [f.term.effect.name for f in found.findings] == ["flow_distortion"]
+    assert suspicion_of(found.naming, STATION) is None
 
 
 def test_friction_keeps_its_name_beside_them() -> None:

@@ -13,7 +13,15 @@ import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
 from wind_sensors.diagnosis.effects.vane import is_vane
-from wind_sensors.station.model import Angle, Instrument, Platform, Station, Vane
+from wind_sensors.station.model import (
+    Angle,
+    Instrument,
+    Platform,
+    Rotor,
+    Station,
+    Vane,
+    WakeShadow,
+)
 
 Entry = Instrument | Platform
 
@@ -136,5 +144,51 @@ SOFT_FIN = Effect(
     },
 )
 
-SUSPECTS = (PLAY, SLEW_LIMIT, CATCH, SOFT_FIN)
+ARMS = 3
+
+
+def _shaded_reference(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Rotor)
+    # The instruments are simulated in the reference's wind: where that reads low, they turn faster.
+    gains = tuple(
+        WakeShadow.model_construct(
+            bearing_from_deg=values["bearing_from"] + 360.0 / ARMS * i,
+            depth=-values["depth"],
+            width_deg=values["width"],
+        )
+        for i in range(ARMS)
+    )
+    return {"wake_shadows": (*entry.wake_shadows, *gains)}
+
+
+REFERENCE_SHADOW = Effect(
+    name="reference_shadow",
+    meaning="a reference in the shadow of its own three arms",
+    entrance="wind",
+    equation="U_ref = U / (1 + depth sum exp(-(D - D_i)^2 / (2 width^2))), D_i 120 deg apart",
+    source="transducer shadows of sonic anemometers, as Gaussian wakes; IEC 61400-12-1, annex on "
+    "mast influence",
+    region="three sectors of wind directions, all speeds",
+    standing=0.06,
+    parameters=(
+        Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=120.0),
+        Parameter("depth", "1", 0.0, 0.4, minimum=0.02),
+        Parameter("width", "deg", 5.0, 25.0, healthy=None, step=0.5),
+    ),
+    applies=lambda entry, station: isinstance(entry, Rotor),
+    update=_shaded_reference,
+    everywhere=True,
+    templates=tuple(
+        {"bearing_from": bearing, "depth": 0.05, "width": 15.0}
+        for bearing in np.arange(0.0, 120.0, 15.0).tolist()
+    ),
+    confusable={
+        "flow_distortion": "turn the reference on its mount: the sectors turn with it",
+        "wake_shadow": "turn the reference on its mount: the sectors turn with it",
+        "calibration_drift": "turn the reference on its mount",
+        "calibration_offset": "turn the reference on its mount",
+    },
+)
+
+SUSPECTS = (PLAY, SLEW_LIMIT, CATCH, SOFT_FIN, REFERENCE_SHADOW)
 """All of them, in the order in which they are tried."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wind_sensors.diagnosis.effects.definition import entry_of, touched
+from wind_sensors.diagnosis.effects.definition import STATION, Effect, entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit, planted
@@ -53,7 +53,8 @@ class Suspicion:
     def words(self) -> str:
         """For people."""
         sizes = ", ".join(
-            f"{p.name.replace('_', ' ')} {self.fault.values[p.name]:.2g} {p.unit}"
+            f"{p.name.replace('_', ' ')} {self.fault.values[p.name]:.3g}"
+            + ("" if p.unit == "1" else f" {p.unit}")
             for p in self.fault.effect.parameters
         )
         against = f" than {self.effect}" if self.effect is not None else ""
@@ -125,16 +126,22 @@ def _in_place_of(term: Term, station: Station) -> list[Trial]:
         for fault in SUSPECTS
         for interval in dict.fromkeys((term.interval, ALWAYS))
         if term.effect.name in fault.confusable
-        for entry in touched(station, fault, term.instrument)
-        if fault.applies(entry_of(station, entry), station)
+        for entry in _entries(fault, term.instrument, station)
         for values in fault.templates
     ]
+
+
+def _entries(fault: Effect, instrument: str, station: Station) -> tuple[str, ...]:
+    """Where a fault is, that is mistaken for an effect of an instrument."""
+    found = touched(station, fault, instrument)
+    able = tuple(name for name in found if fault.applies(entry_of(station, name), station))
+    return (STATION,) if able and fault.everywhere else able
 
 
 def _of_instrument(name: str, station: Station) -> list[Trial]:
     """Suspected faults that an instrument can have, in all their templates."""
     return [
-        Trial(None, Term(fault, name, dict(values)))
+        Trial(None, Term(fault, STATION if fault.everywhere else name, dict(values)))
         for fault in SUSPECTS
         if fault.applies(station.instrument(name), station)
         for values in fault.templates
