@@ -35,9 +35,7 @@ MINIMUM_SIZES: dict[str, MinimumSize] = {
     ),
     "lever_arm": MinimumSize(1.0, "m", "error of the sensor's place", "B"),
     "heading_deviation": MinimumSize(3.0, "deg", "compass deviation, once a turn", "B"),
-    "frame_error": MinimumSize(
-        8.0, "deg", "turn of the velocity's frame", "B", most=11.25
-    ),
+    "frame_error": MinimumSize(8.0, "deg", "turn of the velocity's frame", "B", most=11.25),
     "rotor_downwash": MinimumSize(0.8, "m/s", "downward jet in a calm", "B"),
     "calibration_drift": MinimumSize(0.01, "1", "change of the indicated speed"),
     "calibration_offset": MinimumSize(0.12, "m/s", "loss of speed at every wind"),

@@ -145,6 +145,7 @@ SOFT_FIN = Effect(
 )
 
 ARMS = 3
+"""Of a sonic's head, evenly spaced."""
 
 
 def _shaded_reference(entry: Entry, values: Values) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -96,8 +97,8 @@ def suspicion_of(
 
     starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
     if beside:
-        compared = {c.instrument for c in whitener.comparison.channels}
-        starts += [start for name in sorted(compared) for start in _of_instrument(name, station)]
+        compared = sorted({c.instrument for c in whitener.comparison.channels})
+        starts += _beside_all(compared, station)
     costs = in_parallel(as_it_is, starts, workers)
     cheapest: dict[tuple[object, ...], list[Trial]] = {}
     for cost, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
@@ -132,18 +133,18 @@ def _in_place_of(term: Term, station: Station) -> list[Trial]:
 
 
 def _entries(fault: Effect, instrument: str, station: Station) -> tuple[str, ...]:
-    """Where a fault is, that is mistaken for an effect of an instrument."""
+    """Entries of the station that a fault of an instrument can be in: itself, its vanes, or all."""
     found = touched(station, fault, instrument)
     able = tuple(name for name in found if fault.applies(entry_of(station, name), station))
     return (STATION,) if able and fault.everywhere else able
 
 
-def _of_instrument(name: str, station: Station) -> list[Trial]:
-    """Suspected faults that an instrument can have, in all their templates."""
+def _beside_all(instruments: Sequence[str], station: Station) -> list[Trial]:
+    """Suspected faults that instruments can have, or their reference once, in all templates."""
     return [
-        Trial(None, Term(fault, STATION if fault.everywhere else name, dict(values)))
+        Trial(None, Term(fault, entry, dict(values)))
         for fault in SUSPECTS
-        if fault.applies(station.instrument(name), station)
+        for entry in dict.fromkeys(e for i in instruments for e in _entries(fault, i, station))
         for values in fault.templates
     ]
 
