@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted, simulated_with
 from wind_sensors.diagnosis.explaining.intervals import cell_signatures, interval_gains
 from wind_sensors.diagnosis.explaining.onsets import refined_interval
 from wind_sensors.diagnosis.explaining.search import searcher_of
@@ -53,6 +53,18 @@ def test_what_cannot_hold_all_the_time_keeps_its_interval() -> None:
     null = searcher.whitener(searcher.bank.without)
     found = fit(null, STATION, [passing], None, iterations=0)
     assert refined_interval(searcher, null, found).terms == (passing,)
+
+
+def test_what_is_left_without_a_term_that_held_it_back_is_nothing() -> None:
+    # Alone, this cup would run away; beside an effect that slows it, it would not.
+    comparison = prepare(recorded(STATION, 9, mean=3.0))
+    asymmetry = Term(catalogue()["torque_asymmetry"], "cup", {"a4": 2.7})
+    nothing = comparison.simulate(STATION).flat(comparison.channels)
+    left = simulated_with(comparison, STATION, [asymmetry]).flat(comparison.channels)
+    np.testing.assert_array_equal(left, nothing)
+    slight = Term(catalogue()["torque_asymmetry"], "cup", {"a4": 0.5})
+    moved = simulated_with(comparison, STATION, [slight]).flat(comparison.channels)
+    assert np.abs(np.nan_to_num(moved - nothing)).max() > 0.1
 
 
 def test_cells_add_up_to_what_the_effect_changes_all_the_time() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
@@ -22,6 +23,10 @@ ALWAYS: Interval = (0.0, None)
 
 _LARGEST_DAMPING = 1e5
 
+_SMALLEST_SHARE = 0.05
+_LARGEST_SHARE = 0.3
+"""A step that gained nothing is shortened to no less and no more of it."""
+
 _LEAST_INFORMATION = 1e-4
 
 WIDEST = 4.0
@@ -35,6 +40,10 @@ ROUGHLY = 0.3
 
 _ROUNDING = 1e-5
 """Share of the cost that a step may gain by chance."""
+
+_FAR_OFF = 2e-4
+"""The same of what the cost has above that of noise: where much is left, pulses that fall on one
+side of a bin's border or the other make the cost rough."""
 
 _NEARLY_LINEAR = 0.9
 """Derivatives are carried along after a step that gained this share of what they promised."""
@@ -105,6 +114,21 @@ def planted(station: Station, terms: Sequence[Term]) -> Station:
     for term in sorted(terms, key=lambda t: t.interval != ALWAYS):
         station = term.planted(station)
     return station
+
+
+def simulated_with(
+    comparison: Comparison, station: Station, terms: Sequence[Term]
+) -> Simulated:
+    """Simulation with a part of an explanation; without any effect, if that part cannot be.
+
+    A torque that grows with the rate runs away where the effect that held it back is left out.
+
+    Args:
+        comparison: The recording.
+        station: The station as commissioned.
+        terms: Some of the terms of an explanation that can be.
+    """
+    return comparison.possible(planted(station, terms)) or comparison.simulate(station)
 
 
 @dataclass(frozen=True)
@@ -338,7 +362,7 @@ def fit(
         jacobian = problem.whitened(slopes)
         normal = jacobian.T @ jacobian
         gradient = jacobian.T @ vector
-        worthwhile = least + _ROUNDING * cost
+        worthwhile = least + _ROUNDING * cost + _FAR_OFF * max(cost - vector.size, 0.0)
         gained = promised = 0.0
         while damping < _LARGEST_DAMPING:
             weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
@@ -365,7 +389,12 @@ def fit(
             if not exact:
                 stale = True
                 break
-            damping *= 8.0
+            slope = 2.0 * float(gradient @ moved)
+            least_at = _least_at(slope, trial_cost - cost)
+            if -0.5 * slope * least_at < worthwhile:
+                break
+            share = min(max(least_at, _SMALLEST_SHARE), _LARGEST_SHARE)
+            damping = (1.0 + damping) / share - 1.0
         if gained < worthwhile and (exact or promised < worthwhile):
             break
         exact = False
@@ -376,6 +405,16 @@ def fit(
     return Fit(
         fitted, cost, vector, simulated, covariance, problem.evaluations, active, slopes
     )
+
+
+def _least_at(slope: float, lost: float) -> float:
+    """The part of a step that gained nothing at which the cost is least, if it is a parabola.
+
+    Args:
+        slope: Change of the cost along the step if it went on as it begins; negative.
+        lost: Change of the cost that the step brought; infinite where the station is impossible.
+    """
+    return 0.5 * slope / (slope - lost) if np.isfinite(lost) else _LARGEST_SHARE
 
 
 def _covariance(normal: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:

@@ -57,6 +57,9 @@ FIRST_ITERATIONS = 3
 LAST_ITERATIONS = 4
 """Further ones from the best of them; the best few candidates are fitted to the end."""
 
+TIMES_DERIVED = 8
+"""About so often a candidate's derivatives are taken, to tell which candidates take long."""
+
 TRIED_STARTS = 2
 CLOSE_START = 0.05
 """A second starting point is tried if its deviance lies within this share of the number of data
@@ -330,7 +333,11 @@ class Searcher:
         def one(starts: Sequence[Term]) -> Fit:
             return self.best_fit(whitener, current, starts, rest)
 
-        return self._possible(in_parallel(one, list(candidates), self.workers))
+        def work(starts: Sequence[Term]) -> float:
+            # Starts are tried once each; a fit takes its derivatives anew a few times.
+            return len(starts) + TIMES_DERIVED * len(starts[0].effect.parameters)
+
+        return self._possible(in_parallel(one, list(candidates), self.workers, work=work))
 
     def refit_all(self, whitener: Whitener, explanations: Sequence[Sequence[Term]]) -> list[Fit]:
         """Fits of whole explanations from where they are.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -154,6 +155,7 @@ def in_parallel(
     items: Sequence[Any],
     workers: int,
     progress: Callable[[float], None] | None = None,
+    work: Callable[[Any], float] | None = None,
 ) -> list[Any]:
     """Map over items in forked processes; the function and the items need no pickling.
 
@@ -162,6 +164,8 @@ def in_parallel(
         items: Arguments.
         workers: Number of processes; 1 stays in this one.
         progress: Called with the share done.
+        work: About how long an item takes, in any unit. The longest begin first, so that no
+            process is left waiting for one that began last.
     """
     out: list[Any] = []
     if workers < 2 or len(items) < 2 or "fork" not in multiprocessing.get_all_start_methods():
@@ -171,16 +175,19 @@ def in_parallel(
             if progress:
                 progress(len(out) / len(items))
         return out
+    order = list(range(len(items)))
+    if work is not None:
+        order.sort(key=lambda index: -work(items[index]))
     _TASK.append((function, items))
     try:
         with multiprocessing.get_context("fork").Pool(workers) as pool:
-            for result in pool.imap(_run, range(len(items))):
+            for result in pool.imap(_run, order):
                 out.append(result)
                 if progress:
                     progress(len(out) / len(items))
     finally:
         _TASK.pop()
-    return out
+    return [result for _, result in sorted(zip(order, out, strict=True), key=itemgetter(0))]
 
 
 @dataclass(frozen=True)

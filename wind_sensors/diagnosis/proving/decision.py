@@ -13,7 +13,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, simulated_with
 from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.noise_level import Excess
@@ -214,7 +214,7 @@ def unstirred(naming: Naming, station: Station) -> Comparison | None:
     if not stirring:
         return comparison
     others = [t for t in naming.fit.terms if not t.effect.stirs]
-    without = comparison.simulate(planted(station, others))
+    without = simulated_with(comparison, station, others)
     acts = np.zeros(comparison.grid.n, dtype=np.bool_)
     for channel in comparison.channels:
         change = np.abs(naming.fit.simulated.series[channel.name] - without.series[channel.name])

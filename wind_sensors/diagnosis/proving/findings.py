@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Naming,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, simulated_with
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.proving.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, strongest
@@ -211,7 +211,7 @@ def findings_of(
     out = []
     for k, term in enumerate(naming.fit.terms):
         rest = [t for t in naming.fit.terms if t is not term]
-        beside = whitener.comparison.simulate(planted(baseline.station, rest))
+        beside = simulated_with(whitener.comparison, baseline.station, rest)
         vector = whitener.of(beside) if rest else naming.nothing
         gain = float(vector @ vector) - naming.fit.cost
         passing = term.interval != ALWAYS

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import spectra
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.fitting import Term, planted, simulated_with
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving.held_out import (
     Fold,
@@ -138,9 +138,8 @@ def _acting(
 ) -> FloatArray:
     """Squares of what one of several effects changes in each bin, in units of noise, shape (n,)."""
     comparison = whitener.comparison
-    others = planted(station, [t for t in terms if t is not term])
     after = comparison.simulate(planted(station, terms))
-    before = comparison.possible(others) or comparison.simulate(station)
+    before = simulated_with(comparison, station, [t for t in terms if t is not term])
     squares = np.zeros(comparison.grid.n)
     for channel in comparison.channels:
         noise = float(np.median(whitener.trust[channel.name].deviation))

@@ -229,14 +229,14 @@ def _by_slot(time: FloatArray, slots: int) -> tuple[FloatArray, BoolArray]:
     before = 1.0
     for i in range(1, edges - 1):
         first = max(min(i - half, edges - 2 * half - 1), 0)
-        around = time[first : min(first + 2 * half + 1, edges)]
-        usual = max((around[-1] - around[0]) / (around.size - 1), 1e-9)
+        end = min(first + 2 * half, edges - 1)
+        usual = max((time[end] - time[first]) / (end - first), 1e-9)
         step = 1
         both = time[i + 1] - time[last]
         own = time[i] - time[last]
         if both < PERHAPS_BETWEEN * usual or own > PERHAPS_LOST * usual:
             # A mean is wrong where several edges bounced or were missed; a median takes time.
-            usual = max(float(np.median(np.diff(around))), 1e-9)
+            usual = max(float(np.median(np.diff(time[first : end + 1]))), 1e-9)
             if both < BETWEEN * usual:
                 bounced[i] = True
                 continue
