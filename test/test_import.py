@@ -17,7 +17,9 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings import nmea, read_recording, read_series
 from wind_sensors.recordings.importing import Imported, import_files, write_imported
 from wind_sensors.recordings.mapping import UNITS, read_mapping
+from wind_sensors.recordings.reading import station_topics
 from wind_sensors.recordings.station_files import configuration_folder
+from wind_sensors.station.inputs import absolute
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Recording
 
@@ -46,6 +48,34 @@ def test_shipped_mappings_are_valid(file: Path) -> None:
     found = load_mapping(file.stem)
     assert found.mapping.sources
     assert found.station.instruments
+
+
+@pytest.mark.parametrize("file", MAPPINGS, ids=lambda file: file.stem)
+def test_shipped_mappings_write_nothing_that_their_stations_do_not_read(file: Path) -> None:
+    found = load_mapping(file.stem)
+    assert {absolute(topic) for topic in found.mapping.topics} <= station_topics(found.station)
+
+
+def test_a_topic_that_the_station_calls_otherwise_is_told(tmp_path: Path) -> None:
+    mapping = """
+format: csv
+time: {column: time}
+signals:
+- {column: angle, direction: from_north, topic: /vane/joint_state, type: sensor_msgs/msg/JointState}
+station:
+  instruments:
+  - name: vane
+    kind: vane
+    joint_states: /vane/joint_states
+    distance_constant: 1.3
+    damping_ratio: 0.3
+  reference: {kind: sonic, topic: /reference/wind}
+"""
+    table = tmp_path / "table.csv"
+    table.write_text("time,angle\n2026-01-01T00:00:00,10\n2026-01-01T00:00:01,11\n", "utf-8")
+    (note,) = import_files([table], read_mapping(mapping, "map.yaml")).notes
+    assert note.startswith("/vane/joint_state:")
+    assert "did you mean /vane/joint_states?" in note
 
 
 def test_units_agree_with_their_definitions() -> None:

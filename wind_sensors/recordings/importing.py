@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,9 +27,11 @@ from wind_sensors.recordings.mapping import (
     Vector,
 )
 from wind_sensors.recordings.raw_topics import BODY_FRAME, running_time
+from wind_sensors.recordings.reading import station_topics
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
 from wind_sensors.recordings.writing import write_topics
 from wind_sensors.station.inputs import DEFAULT_FIELDS, FieldPath, absolute, field_path, full_type
+from wind_sensors.station.model import Station
 from wind_sensors.station.signals import FloatArray, TimeArray
 
 EARTH_RADIUS = 6_371_008.8
@@ -115,7 +118,19 @@ def import_files(
         builder.add_vector(vector, merged[id(vector.speed)], merged[id(vector.direction_from)])
     if mapping.platform is not None:
         builder.add_platform(mapping.platform, merged)
-    return Imported(tuple(builder.messages()), faults, tuple(builder.notes))
+    topics = tuple(builder.messages())
+    notes = [*builder.notes, *_unread(mapping, mapping_file.station)]
+    return Imported(topics, faults, tuple(notes))
+
+
+def _unread(mapping: Mapping, station: Station) -> Iterator[str]:
+    """What is said about topics of a mapping that its station does not read."""
+    written = {absolute(topic) for topic in mapping.topics}
+    read = station_topics(station)
+    for topic in sorted(written - read):
+        close = get_close_matches(topic, read - written, n=1)
+        meant = f" (did you mean {close[0]}?)" if close else ""
+        yield f"{topic}: nothing in `station` reads it{meant}"
 
 
 def write_imported(

@@ -194,6 +194,13 @@ class Mapping(Entry):
         return found
 
 
+    @property
+    def topics(self) -> list[str]:
+        """Every topic that the mapping writes."""
+        found = [part.topic for part in (*self.signals, *self.vectors)]
+        return found if self.platform is None else [*found, self.platform.topic]
+
+
 @dataclass(frozen=True)
 class MappingFile:
     """A validated mapping and the station file it carries.
