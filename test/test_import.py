@@ -17,9 +17,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings import nmea, read_recording, read_series
 from wind_sensors.recordings.importing import Imported, import_files, write_imported
 from wind_sensors.recordings.mapping import UNITS, read_mapping
-from wind_sensors.recordings.reading import station_topics
 from wind_sensors.recordings.station_files import configuration_folder
-from wind_sensors.station.inputs import absolute
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Recording
 
@@ -50,18 +48,13 @@ def test_shipped_mappings_are_valid(file: Path) -> None:
     assert found.station.instruments
 
 
-@pytest.mark.parametrize("file", MAPPINGS, ids=lambda file: file.stem)
-def test_shipped_mappings_write_nothing_that_their_stations_do_not_read(file: Path) -> None:
-    found = load_mapping(file.stem)
-    assert {absolute(topic) for topic in found.mapping.topics} <= station_topics(found.station)
-
-
 def test_a_topic_that_the_station_calls_otherwise_is_told(tmp_path: Path) -> None:
     mapping = """
 format: csv
 time: {column: time}
 signals:
 - {column: angle, direction: from_north, topic: /vane/joint_state, type: sensor_msgs/msg/JointState}
+- {column: angle, topic: /vane/angle_deviation}
 station:
   instruments:
   - name: vane

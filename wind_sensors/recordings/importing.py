@@ -36,6 +36,10 @@ from wind_sensors.station.signals import FloatArray, TimeArray
 
 EARTH_RADIUS = 6_371_008.8
 """Mean radius [m]; positions of one recording lie close together."""
+
+ALIKE = 0.8
+"""A recording may hold what its station does not read; a name so much like one that it does read,
+and that nothing is written to, is a slip."""
 _WORST_FRACTION = 0.1
 """A pulse count this far from a whole number is none."""
 _NEAREST_FIX = 3_000_000_000
@@ -119,18 +123,17 @@ def import_files(
     if mapping.platform is not None:
         builder.add_platform(mapping.platform, merged)
     topics = tuple(builder.messages())
-    notes = [*builder.notes, *_unread(mapping, mapping_file.station)]
+    notes = [*builder.notes, *_misspelt(mapping, mapping_file.station)]
     return Imported(topics, faults, tuple(notes))
 
 
-def _unread(mapping: Mapping, station: Station) -> Iterator[str]:
-    """What is said about topics of a mapping that its station does not read."""
+def _misspelt(mapping: Mapping, station: Station) -> Iterator[str]:
+    """What is said about topics of a mapping that its station seems to know by another name."""
     written = {absolute(topic) for topic in mapping.topics}
     read = station_topics(station)
     for topic in sorted(written - read):
-        close = get_close_matches(topic, read - written, n=1)
-        meant = f" (did you mean {close[0]}?)" if close else ""
-        yield f"{topic}: nothing in `station` reads it{meant}"
+        for meant in get_close_matches(topic, read - written, n=1, cutoff=ALIKE):
+            yield f"{topic}: nothing in `station` reads it (did you mean {meant}?)"
 
 
 def write_imported(

@@ -197,7 +197,8 @@ class Mapping(Entry):
     @property
     def topics(self) -> list[str]:
         """Every topic that the mapping writes."""
-        found = [part.topic for part in (*self.signals, *self.vectors)]
+        found = [signal.topic for signal in self.signals]
+        found += [vector.topic for vector in self.vectors]
         return found if self.platform is None else [*found, self.platform.topic]
 
 
