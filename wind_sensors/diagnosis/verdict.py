@@ -22,7 +22,7 @@ from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
 from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
-from wind_sensors.diagnosis.proving.judging import judgement_of
+from wind_sensors.diagnosis.proving.judging import judgement_of, with_suspicion
 from wind_sensors.diagnosis.regions import Found, RegionBank
 from wind_sensors.diagnosis.smallest_size import SmallestSize, smallest_size
 from wind_sensors.station.model import Station
@@ -196,6 +196,7 @@ def diagnose(
         if alone is not None:
             single = judgement_of(searcher, alone, baseline, workers, report, with_proof)
             judged = single if single.is_claim else judged
+    judged = with_suspicion(judged, baseline.station, workers)
     naming = judged.naming
     named = naming.fit.terms if judged.is_claim else ()
     # What commissioning found makes up for the reference as much as for the instrument.

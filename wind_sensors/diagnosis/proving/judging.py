@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,7 +51,7 @@ from wind_sensors.diagnosis.proving.support import (
     passes_unseen,
     stands_out,
 )
-from wind_sensors.diagnosis.proving.suspicions import suspicion_of
+from wind_sensors.diagnosis.proving.suspicions import suspicion_beside, suspicion_of
 from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.station.model import Station
 
@@ -167,9 +167,6 @@ def judgement_of(
         verdict = "unknown"
     if calm and verdict == "unknown":
         verdict = "inconclusive"
-    if verdict == "unknown" and not objection:
-        suspicion = suspicion_of(naming, baseline.station, workers, beside=True)
-        objection = suspicion.words if suspicion is not None else ""
     return Judgement(
         naming=naming,
         verdict=verdict,
@@ -183,6 +180,20 @@ def judgement_of(
         regions_before=tuple(before),
         regions=tuple(_structured(before) if verdict == "unknown" else after),
     )
+
+
+def with_suspicion(judgement: Judgement, station: Station, workers: int) -> Judgement:
+    """The same; of an unknown to which nothing was objected, what it might be.
+
+    Args:
+        judgement: What was judged.
+        station: As commissioned.
+        workers: Processes.
+    """
+    if judgement.verdict != "unknown" or judgement.objection:
+        return judgement
+    suspicion = suspicion_beside(judgement.naming, station, workers)
+    return judgement if suspicion is None else replace(judgement, objection=suspicion.words)
 
 
 def _noise_left(naming: Naming, baseline: Baseline) -> Excess:

@@ -12,7 +12,7 @@ import numpy as np
 from wind_sensors.diagnosis.effects.definition import STATION, Effect, entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, planted
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -24,6 +24,11 @@ parameter paid for."""
 
 STARTS = 2
 """From so many of its templates, those that explain most as they are, a fault is fitted."""
+
+ALONE = 4
+TOGETHER = 3
+"""To describe an unknown, faults are fitted alone in so many steps, the best few of them with what
+fits."""
 
 BESIDE = 50.0
 """An unknown is described by a fault that lowers the cost by more than this beside what fits."""
@@ -66,39 +71,57 @@ class Suspicion:
         )
 
 
-def suspicion_of(
-    naming: Naming, station: Station, workers: int = 1, beside: bool = False
-) -> Suspicion | None:
+def suspicion_of(naming: Naming, station: Station, workers: int = 1) -> Suspicion | None:
     """The suspected fault that explains most beyond what the effect in its place does.
 
     Args:
         naming: The explanation.
         station: As commissioned.
         workers: Processes.
-        beside: Faults are tried beside what fits, too, which is known not to be all.
 
     Returns:
         None: no suspected fault explains more than the effects with which it can be confused.
     """
+    starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
+    return _most_telling(naming, station, _promising(naming, station, starts, workers), workers)
+
+
+def suspicion_beside(naming: Naming, station: Station, workers: int = 1) -> Suspicion | None:
+    """The same, beside what fits, too, where that is known not to be all.
+
+    Nothing is decided by it: of the faults only those are fitted together with what fits that
+    explain most when they are fitted alone.
+    """
+    compared = sorted({c.instrument for c in naming.whitener.comparison.channels})
+    starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
+    starts += _beside_all(compared, station)
+    chosen = _promising(naming, station, starts, workers)
+
+    def alone(start: Trial) -> float:
+        others = planted(station, _with_fault(naming, start)[:-1])
+        return fit(naming.whitener, others, [start.fault], None, ALONE, least=ROUGHLY).cost
+
+    costs = in_parallel(alone, chosen, workers)
+    best = sorted(zip(costs, chosen, strict=True), key=lambda pair: pair[0])[:TOGETHER]
+    return _most_telling(naming, station, [start for _, start in best], workers)
+
+
+def _with_fault(naming: Naming, start: Trial) -> list[Term]:
+    """Terms of a trial, the fault last."""
+    return [*(t for t in naming.fit.terms if t != start.term), start.fault]
+
+
+def _promising(
+    naming: Naming, station: Station, starts: Sequence[Trial], workers: int
+) -> list[Trial]:
+    """Of each fault in each place the templates that explain most as they are."""
     whitener = naming.whitener
 
-    def with_fault(start: Trial) -> list[Term]:
-        return [*(t for t in naming.fit.terms if t != start.term), start.fault]
-
     def as_it_is(start: Trial) -> float:
-        simulated = whitener.comparison.possible(planted(station, with_fault(start)))
+        tried = planted(station, _with_fault(naming, start))
+        simulated = whitener.comparison.possible(tried)
         return math.inf if simulated is None else float(np.sum(whitener.of(simulated) ** 2))
 
-    def fitted(start: Trial) -> Suspicion:
-        found = fit(whitener, station, with_fault(start))
-        gain = _price(whitener, naming.fit) - _price(whitener, found)
-        effect = start.term.effect.name if start.term is not None else None
-        return Suspicion(found.terms[-1], effect, gain)
-
-    starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
-    if beside:
-        compared = sorted({c.instrument for c in whitener.comparison.channels})
-        starts += _beside_all(compared, station)
     costs = in_parallel(as_it_is, starts, workers)
     cheapest: dict[tuple[object, ...], list[Trial]] = {}
     for cost, start in sorted(zip(costs, starts, strict=True), key=lambda pair: pair[0]):
@@ -110,8 +133,22 @@ def suspicion_of(
             start.fault.interval,
         )
         cheapest.setdefault(key, []).append(start)
-    chosen = [start for group in cheapest.values() for start in group[:STARTS]]
-    found = in_parallel(fitted, chosen, workers)
+    return [start for group in cheapest.values() for start in group[:STARTS]]
+
+
+def _most_telling(
+    naming: Naming, station: Station, starts: Sequence[Trial], workers: int
+) -> Suspicion | None:
+    """The fault that explains most when it is fitted with the other terms, if it is enough."""
+    whitener = naming.whitener
+
+    def fitted(start: Trial) -> Suspicion:
+        found = fit(whitener, station, _with_fault(naming, start))
+        gain = _price(whitener, naming.fit) - _price(whitener, found)
+        effect = start.term.effect.name if start.term is not None else None
+        return Suspicion(found.terms[-1], effect, gain)
+
+    found = in_parallel(fitted, starts, workers)
     telling = [s for s in found if s.gain > (OUTDONE if s.effect is not None else BESIDE)]
     return max(telling, key=lambda s: s.gain, default=None)
 
