@@ -23,10 +23,6 @@ ALWAYS: Interval = (0.0, None)
 
 _LARGEST_DAMPING = 1e5
 
-_SMALLEST_SHARE = 0.05
-_LARGEST_SHARE = 0.3
-"""A step that gained nothing is shortened to no less and no more of it."""
-
 _LEAST_INFORMATION = 1e-4
 
 WIDEST = 4.0
@@ -389,12 +385,7 @@ def fit(
             if not exact:
                 stale = True
                 break
-            slope = 2.0 * float(gradient @ moved)
-            least_at = _least_at(slope, trial_cost - cost)
-            if -0.5 * slope * least_at < worthwhile:
-                break
-            share = min(max(least_at, _SMALLEST_SHARE), _LARGEST_SHARE)
-            damping = (1.0 + damping) / share - 1.0
+            damping *= 8.0
         if gained < worthwhile and (exact or promised < worthwhile):
             break
         exact = False
@@ -405,16 +396,6 @@ def fit(
     return Fit(
         fitted, cost, vector, simulated, covariance, problem.evaluations, active, slopes
     )
-
-
-def _least_at(slope: float, lost: float) -> float:
-    """The part of a step that gained nothing at which the cost is least, if it is a parabola.
-
-    Args:
-        slope: Change of the cost along the step if it went on as it begins; negative.
-        lost: Change of the cost that the step brought; infinite where the station is impossible.
-    """
-    return 0.5 * slope / (slope - lost) if np.isfinite(lost) else _LARGEST_SHARE
 
 
 def _covariance(normal: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
