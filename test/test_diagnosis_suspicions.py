@@ -12,7 +12,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit
-from wind_sensors.diagnosis.proving.suspicions import suspicion_of
+from wind_sensors.diagnosis.proving.suspicions import suspicion_beside, suspicion_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Angles, Recording
 
@@ -38,6 +38,17 @@ def test_play_is_no_friction_though_both_hold_the_reading_still(play_deg: float)
     assert suspicion is not None
     assert suspicion.fault.effect.name == "play"
     assert suspicion.fault.values["play"] == pytest.approx(play_deg, rel=0.1)
+
+
+def test_an_unknown_beside_nothing_is_described_by_the_fault_that_explains_it() -> None:
+    naming = diagnose(_behind_play(recorded(STATION, 66), 14.0), baseline()).naming
+    nothing = replace(naming, fit=fit(naming.whitener, STATION, []))
+    suspicion = suspicion_beside(nothing, STATION)
+    assert suspicion is not None
+    assert (suspicion.fault.key, suspicion.effect) == (("play", "vane"), None)
+    assert suspicion.fault.values["play"] == pytest.approx(14.0, rel=0.1)
+    assert "would explain more, by" in suspicion.words
+    assert suspicion_of(nothing, STATION) is None
 
 
 def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings() -> None:
