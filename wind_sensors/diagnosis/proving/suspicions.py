@@ -82,8 +82,8 @@ def suspicion_of(naming: Naming, station: Station, workers: int = 1) -> Suspicio
     Returns:
         None: no suspected fault explains more than the effects with which it can be confused.
     """
-    starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
-    return _most_telling(naming, station, _promising(naming, station, starts, workers), workers)
+    chosen = _promising(naming, station, _in_places(naming, station), workers)
+    return _most_telling(naming, station, chosen, workers)
 
 
 def suspicion_beside(naming: Naming, station: Station, workers: int = 1) -> Suspicion | None:
@@ -93,8 +93,7 @@ def suspicion_beside(naming: Naming, station: Station, workers: int = 1) -> Susp
     explain most when they are fitted alone.
     """
     compared = sorted({c.instrument for c in naming.whitener.comparison.channels})
-    starts = [start for term in naming.fit.terms for start in _in_place_of(term, station)]
-    starts += _beside_all(compared, station)
+    starts = [*_in_places(naming, station), *_beside_all(compared, station)]
     chosen = _promising(naming, station, starts, workers)
 
     def alone(start: Trial) -> float:
@@ -151,6 +150,11 @@ def _most_telling(
     found = in_parallel(fitted, starts, workers)
     telling = [s for s in found if s.gain > (OUTDONE if s.effect is not None else BESIDE)]
     return max(telling, key=lambda s: s.gain, default=None)
+
+
+def _in_places(naming: Naming, station: Station) -> list[Trial]:
+    """Suspected faults in the place of each effect."""
+    return [start for term in naming.fit.terms for start in _in_place_of(term, station)]
 
 
 def _in_place_of(term: Term, station: Station) -> list[Trial]:
