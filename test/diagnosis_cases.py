@@ -19,7 +19,7 @@ from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.pulses import edge_times
 from wind_sensors.simulation.response import respond
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
 
 DT = 0.05
@@ -50,7 +50,13 @@ def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> np.
     return size * np.sqrt(1.0 - decay**2) * lfilter([1.0], [1.0, -decay], drawn)[4000:]
 
 
-def recorded(station: Station, seed: int, mean: float = 7.0, swing: float = 0.0) -> Recording:
+def recorded(
+    station: Station,
+    seed: int,
+    mean: float = 7.0,
+    swing: float = 0.0,
+    described: Station = STATION,
+) -> Recording:
     """A recording of a station in a wind that its reference sees with errors.
 
     Args:
@@ -58,6 +64,7 @@ def recorded(station: Station, seed: int, mean: float = 7.0, swing: float = 0.0)
         seed: Of the wind.
         mean: Speed [m/s].
         swing: Amplitude of a turning to and fro every 45 s [rad].
+        described: What the recording's station file says.
     """
     rng = np.random.default_rng(seed)
     n = int(SECONDS / DT)
@@ -73,12 +80,13 @@ def recorded(station: Station, seed: int, mean: float = 7.0, swing: float = 0.0)
     drive = Drive(start_ns=0, dt=DT, wind=wind)
     response = respond(station, drive)
     times = drive.times_ns
+    (rotor,) = (entry.name for entry in described.instruments if isinstance(entry, Rotor))
     return Recording(
         name=f"seed-{seed}",
-        station=STATION,
+        station=described,
         start=0,
         stop=int(times[-1]),
-        pulses={"cup": Pulses(edge_times(response, "cup"))},
+        pulses={rotor: Pulses(edge_times(response, rotor))},
         angles={"vane": Angles(times, angle_readings(response, "vane", times))},
         reference=Winds(times, seen),
     )

@@ -286,11 +286,37 @@ def test_readings_tell_where_a_gap_is_and_since_when(width: float, begins: float
     station = with_effect(STATION, gap, "vane", values, (begins, None))
     comparison = prepare(recorded(station, 84, swing=0.8))
     (told,) = (t for t in guesses_of(comparison, STATION)[("potentiometer_gap", "vane")] if t.held)
-    assert np.mod(told.values["centre"] - 190.0 + 180.0, 360.0) - 180.0 == pytest.approx(0, abs=1.0)
-    assert told.values["width"] == pytest.approx(width, abs=2.0)
+    assert np.mod(told.values["centre"] - 190.0 + 180.0, 360.0) - 180.0 == pytest.approx(0, abs=0.2)
+    assert told.values["width"] == pytest.approx(width, abs=0.4)
     assert np.mod(told.values["reading"] - value + 180.0, 360.0) == pytest.approx(180.0, abs=0.01)
     assert told.interval[0] == pytest.approx(begins, abs=25.0)
     assert told.interval[1] is None
+
+
+@pytest.mark.parametrize(("width", "begins"), [(12.0, 0.0), (34.0, 0.0), (16.0, 100.0)])
+def test_good_readings_tell_where_a_wiper_floats_and_since_when(
+    width: float, begins: float
+) -> None:
+    values = {"centre": 190.0, "width": width, "reading": 0.0, "form": 2.0}
+    gap = catalogue()["potentiometer_gap"]
+    station = with_effect(STATION, gap, "vane", values, (begins, None))
+    comparison = prepare(recorded(station, 84, swing=0.8))
+    (told,) = (t for t in guesses_of(comparison, STATION)[("potentiometer_gap", "vane")] if t.held)
+    assert told.values["form"] == 2.0
+    assert np.mod(told.values["centre"] - 190.0 + 180.0, 360.0) - 180.0 == pytest.approx(0, abs=0.6)
+    # Good readings beside a jump count as jumps.
+    assert told.values["width"] == pytest.approx(width + 0.7, abs=0.9)
+    assert told.interval[0] == pytest.approx(begins, abs=25.0)
+    assert told.interval[1] is None
+
+
+def test_a_floating_wiper_that_never_comes_out_on_one_side_tells_no_gap() -> None:
+    values = {"centre": 230.0, "width": 80.0, "reading": 0.0, "form": 2.0}
+    gap = catalogue()["potentiometer_gap"]
+    comparison = prepare(recorded(with_effect(STATION, gap, "vane", values), 84))
+    guesses = guesses_of(comparison, STATION)[("potentiometer_gap", "vane")]
+    assert guesses
+    assert not any(t.held for t in guesses)
 
 
 def test_what_chance_draws_differs_by_as_much_as_chance_says() -> None:

@@ -11,7 +11,7 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
+from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of, with_keys
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
@@ -25,7 +25,7 @@ from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
 from wind_sensors.diagnosis.proving.judging import judgement_of, with_suspicion
 from wind_sensors.diagnosis.regions import Found, RegionBank
 from wind_sensors.diagnosis.smallest_size import SmallestSize, smallest_size
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.silence import Silent, silent_instruments
 
@@ -138,6 +138,21 @@ def _moving(comparison: Comparison, terms: Sequence[Term]) -> Comparison | None:
     return moved if np.mean(change) > OTHER_SPEED * np.mean(comparison.speed) else None
 
 
+def _to_plant_on(baseline: Baseline, named: Sequence[Term]) -> Station:
+    """The station as its file describes it, with what named factors of inertia are relative to.
+
+    What else commissioning found makes up for the reference as much as for the instrument.
+    """
+    station = baseline.original
+    for term in named:
+        if any(p.name == "inertia_factor" for p in term.effect.parameters):
+            healthy = entry_of(baseline.station, term.instrument)
+            assert isinstance(healthy, Rotor | Angle)
+            keys = {"inertia_factor": healthy.inertia_factor}
+            station = with_keys(station, term.instrument, keys)
+    return station
+
+
 def diagnose(
     recording: Recording,
     baseline: Baseline,
@@ -199,8 +214,7 @@ def diagnose(
     judged = with_suspicion(judged, baseline.station, workers)
     naming = judged.naming
     named = naming.fit.terms if judged.is_claim else ()
-    # What commissioning found makes up for the reference as much as for the instrument.
-    station = planted(baseline.original, named)
+    station = planted(_to_plant_on(baseline, named), named)
     remainder = judged.remainder
     silent = silent_instruments(recording, baseline.station)
     told = (*(each.words for each in silent), judged.words(baseline))

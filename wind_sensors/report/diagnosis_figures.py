@@ -111,7 +111,8 @@ def residual_figure(
         if corrected is not None:
             over_time.plot(cut, _smooth(after, smoothed), color=style.CORRECTED, label="with it")
             if stacked:
-                over_time.legend(loc="upper right", ncols=2)
+                # Its title may take two lines, so that there is no room beside it.
+                made.legend(loc="outside upper right", ncols=2)
             else:
                 over_time.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 1.0))
         over_time.axhline(0.0, color=style.MUTED, linewidth=0.8)

@@ -10,6 +10,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.proving.decision import REMAINDER_P, REMAINDER_SCORES
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
@@ -24,7 +25,7 @@ from wind_sensors.report.diagnosis_figures import (
 )
 from wind_sensors.report.names import names_of, silence_of, words
 from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Angle, Propeller, Rotor, Station
 from wind_sensors.station.silence import Silent
 
 STYLE = """
@@ -305,6 +306,33 @@ def _taken_out(without: Sequence[str]) -> str:
     return f"<p><b>Taken out of the catalogue, and so not looked for:</b> {names}.</p>"
 
 
+def _healthy(baseline: Baseline) -> str:
+    """The healthy recordings, and where their instruments differ from the station's file."""
+    names = ", ".join(baseline.recordings) or "none"
+    out = f"<p class='muted'>Healthy recordings behind the baseline: {escape(names)}.</p>"
+    before = {entry.name: entry for entry in baseline.original.instruments}
+    shown = []
+    for entry in baseline.station.instruments:
+        described = before[entry.name]
+        if isinstance(entry, Rotor) and isinstance(described, Rotor):
+            gain = entry.calibration_gain / described.calibration_gain
+            offset = entry.calibration_offset - described.calibration_offset
+            differs = f"{escape(entry.name)}: gain {gain:.3f}, offset {offset:+.2f} m/s"
+            if isinstance(entry, Propeller):
+                inertia = entry.inertia_factor / described.inertia_factor
+                differs += f", inertia factor {inertia:.2f}"
+            shown.append(differs)
+        elif isinstance(entry, Angle) and isinstance(described, Angle):
+            turned = entry.offset_deg - described.offset_deg
+            shown.append(f"{escape(entry.name)}: offset {turned:+.1f} deg")
+    if baseline.calibrated and shown:
+        out += (
+            "<p class='muted'>What they show beyond the station's file, from which the sizes of "
+            f"findings count: {'; '.join(shown)}.</p>"
+        )
+    return out
+
+
 def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
     """The report as one HTML file without outside references.
 
@@ -332,7 +360,6 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
                 ("raw signals", statistics_figure, beside_healthy),
             )
         ]
-    healthy = ", ".join(diagnosis.baseline.recordings) or "none"
     body = [
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
         f"{escape(diagnosis.recording)} · wind diagnose</div>"
@@ -348,7 +375,7 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         _next(diagnosis),
         _left(diagnosis),
         _detectable(diagnosis),
-        f"<p class='muted'>Healthy recordings behind the baseline: {escape(healthy)}.</p>",
+        _healthy(diagnosis.baseline),
         _taken_out(without),
     ]
     return document(f"Diagnosis of {diagnosis.recording}", "".join(body))

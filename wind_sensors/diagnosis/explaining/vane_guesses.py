@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -30,6 +31,9 @@ BESIDE_HOLE = 20
 LEAST_BESIDE_HOLE = 0.015
 """A hole in a vane's readings is so many degrees wide, no degree of it has the second share of what
 usual degrees have, and so many degrees on either side have this share of all readings."""
+
+MANY_BESIDE_EDGE = 3
+"""A degree beside a gap with a floating wiper has so many readings; fewer are chance."""
 
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
@@ -123,7 +127,7 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
             there = np.abs(np.degrees(delivered) - low) < SAME_VALUE
             sectors = [_sector(comparison, channel, there), *([hole] if hole else beside)]
             out.extend(_gap(vane, *sector, 1, low) for sector in sectors)
-            out.extend(_told_gap(comparison, vane, low))
+            out.extend(_told_gap(comparison, vane, there, _hole, low))
             out.extend(_gap(vane, *sector) for sector in sectors)
         else:
             width = high - low
@@ -135,31 +139,43 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
     return out
 
 
-def _told_gap(comparison: Comparison, vane: str, value: float) -> list[Term]:
-    """A gap in which the vane reads one value, for as long as it reads nothing else there.
+def _told_gap(
+    comparison: Comparison,
+    vane: str,
+    there: BoolArray,
+    between: Callable[[FloatArray], tuple[float, float] | None],
+    reading: float | None = None,
+) -> list[Term]:
+    """A gap in which the vane reads something else, for as long as it reads nothing in it.
 
     Args:
         comparison: The recording.
         vane: Its name.
-        value: What it reads there [deg].
+        there: Readings that are made in the gap, shape (n,).
+        between: Centre and width [deg] of a gap among the other readings [deg], if there is one.
+        reading: What the vane reads there [deg]; None: anything.
 
     Returns:
         Nothing where other directions are missing in that time, too, or none are.
     """
     readings = comparison.recording.angles[vane]
-    told = np.isfinite(readings.angle)
-    degrees, time = np.degrees(readings.angle[told]), comparison.grid.seconds(readings.time[told])
-    (there,) = np.nonzero(np.abs(degrees - value) < SAME_VALUE)
-    begin, end = there[0], there[-1]
-    hole = _hole(degrees[begin : end + 1])
-    if hole is None:
+    degrees, time = np.degrees(readings.angle), comparison.grid.seconds(readings.time)
+    other = np.isfinite(degrees) & ~there
+    (inside,) = np.nonzero(there)
+    begin, end = inside[0], inside[-1]
+    sector = between(degrees[begin : end + 1][other[begin : end + 1]])
+    if sector is None:
         return []
-    away = np.mod(degrees - hole[0] + 180.0, 360.0) - 180.0
-    (inside,) = np.nonzero(np.abs(away) < 0.5 * hole[1] - 1.0)
-    before, after = inside[inside < begin], inside[inside > end]
-    begins = float(time[begin]) if before.size else 0.0
-    ends = float(time[end]) if after.size else np.inf
-    gap = replace(_gap(vane, *hole, 1, value), held=frozenset({"centre", "width", "reading"}))
+    centre, width = sector
+    away = np.mod(degrees - centre + 180.0, 360.0) - 180.0
+    (good,) = np.nonzero(other & (np.abs(away) < 0.5 * width - 1.0))
+    begins = float(time[begin]) if np.any(good < begin) else 0.0
+    ends = float(time[end]) if np.any(good > end) else np.inf
+    if reading is None:
+        gap = replace(_gap(vane, *sector, 2), held=frozenset({"centre", "width"}))
+    else:
+        gap = _gap(vane, *sector, 1, reading)
+        gap = replace(gap, held=frozenset({"centre", "width", "reading"}))
     return [replace(gap, interval=interval_of(comparison, begins, ends))]
 
 
@@ -220,12 +236,31 @@ def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     wrong = erratic(comparison.recording.angles[channel.instrument])
     if not wrong.any() or np.mean(wrong) < LEAST_ERRATIC:
         return []
+    vane = channel.instrument
     centre, width = _sector(comparison, channel, wrong)
+    told = _told_gap(comparison, vane, wrong, lambda steady: _around(steady, centre))
     sectors = [(centre, share * width) for share in NARROWER]
-    return [
-        _gap(channel.instrument, *sector, 2)
+    return told + [
+        _gap(vane, *sector, 2)
         for sector in (*_mostly(comparison, channel, wrong, centre), *sectors)
     ]
+
+
+def _around(degrees: FloatArray, inside: float) -> tuple[float, float] | None:
+    """Centre and width of the sector without readings in which a direction lies [deg].
+
+    A few readings in it may be chance; None: there are not many on either side.
+    """
+    away = np.mod(degrees - inside + 180.0, 360.0) - 180.0
+    counts, _ = np.histogram(away, np.arange(-180.0, 181.0))
+    many = np.flatnonzero(counts >= MANY_BESIDE_EDGE) - 180
+    if not np.any(many < 0) or not np.any(many >= 0):
+        return None
+    below, above = many[many < 0].max(), many[many >= 0].min()
+    low, high = float(away[away < below + 1].max()), float(away[away >= above].min())
+    if high - low > WIDEST_HOLE:
+        return None
+    return (inside + 0.5 * (low + high)) % 360.0, high - low
 
 
 def _mostly(
@@ -277,7 +312,10 @@ def _hole(degrees: FloatArray) -> tuple[float, float] | None:
     for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
         beside = (np.arange(begin - BESIDE_HOLE, begin), np.arange(end, end + BESIDE_HOLE))
         peopled = all(np.sum(counts[np.mod(at, 360)]) > least for at in beside)
-        width = float(end - begin)
-        if peopled and NARROWEST_HOLE <= width <= WIDEST_HOLE and (not found or width > found[1]):
-            found = float((0.5 * (begin + end)) % 360.0), width
+        if peopled and NARROWEST_HOLE <= end - begin <= WIDEST_HOLE:
+            away = np.mod(degrees - 0.5 * (begin + end) + 180.0, 360.0) - 180.0
+            half = 0.5 * (end - begin)
+            low, high = float(away[away < -half].max()), float(away[away >= half].min())
+            if not found or high - low > found[1]:
+                found = float((0.5 * (begin + end + low + high)) % 360.0), high - low
     return found

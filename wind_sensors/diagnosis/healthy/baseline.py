@@ -144,7 +144,7 @@ class Baseline:
         recordings: Names of the recordings; empty: none were given (null not calibrated).
         original: The station as its file described it.
         station: The station as commissioned: its file with the standing differences that a gain,
-            an offset, a mounting angle can describe.
+            an offset, a factor of inertia, a mounting angle can describe.
         channels: By channel name.
         means: Amplitude of each template shared by the healthy recordings, by
             `effect|instrument|template number`, in units of the template.
@@ -203,7 +203,8 @@ class Baseline:
     def for_station(self, station: Station) -> Baseline:
         """The same baseline for a recording whose station file may say otherwise.
 
-        What commissioning found (gains, offsets, mounting angles) goes on top of that file.
+        What commissioning found (gains, offsets, inertia, mounting angles) goes on top of that
+        file.
         """
         same = (
             station.instruments == self.original.instruments
@@ -306,6 +307,9 @@ def _commissioned(
                 "calibration_offset": entry.calibration_offset
                 + after.calibration_offset
                 - before.calibration_offset,
+                "inertia_factor": entry.inertia_factor
+                * after.inertia_factor
+                / before.inertia_factor,
             }
         )
     if isinstance(entry, Angle) and isinstance(before, Angle) and isinstance(after, Angle):

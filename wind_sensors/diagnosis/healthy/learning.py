@@ -39,7 +39,7 @@ from wind_sensors.diagnosis.healthy.whitening import (
     unstanding,
 )
 from wind_sensors.errors import UserError
-from wind_sensors.station.model import Angle, Rotor, Station
+from wind_sensors.station.model import Angle, Propeller, Rotor, Station
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.silence import silent_instruments
 
@@ -51,6 +51,10 @@ STANDING_TOLERANCES = (
     ("vane_offset", "offset", 1.0),
 )
 """What commissioning may correct: effect, parameter, tolerance of the certificate."""
+
+PROPELLER_TOLERANCES = (("rotor_inertia", "inertia_factor", 0.3),)
+"""And of propellers: a certificate's distance constant is that of a release from rest, in which
+their blades begin stalled. In the gusts that they turn in they may answer within half of it."""
 
 _PRIOR_STRENGTH = 3.0
 """Weight of the prior in healthy variances, in recordings."""
@@ -240,16 +244,20 @@ def _noise(
 def _commissioned(
     comparisons: Sequence[Comparison], station: Station, baseline: Baseline
 ) -> Station:
-    """The station with the gains, offsets and mounting angles that its healthy days show."""
+    """The station with the gains, offsets, mounting angles and inertia of its healthy days."""
     effects = catalogue()
     terms: list[tuple[Effect, str, str, float]] = []
-    for effect_name, parameter, tolerance in STANDING_TOLERANCES:
-        effect = effects[effect_name]
-        terms.extend(
-            (effect, entry.name, parameter, tolerance)
-            for entry in station.instruments
-            if isinstance(entry, Rotor | Angle) and effect.applies(entry, station)
-        )
+    for kind, tolerances in (
+        (Rotor | Angle, STANDING_TOLERANCES),
+        (Propeller, PROPELLER_TOLERANCES),
+    ):
+        for effect_name, parameter, tolerance in tolerances:
+            effect = effects[effect_name]
+            terms.extend(
+                (effect, entry.name, parameter, tolerance)
+                for entry in station.instruments
+                if isinstance(entry, kind) and effect.applies(entry, station)
+            )
     current = station
     for _ in range(2):
         normal = np.eye(len(terms))
@@ -281,7 +289,9 @@ def _commissioned(
             terms, amplitudes, strict=True
         ):
             healthy = effect.parameters[0].healthy or 0.0
-            values = {parameter: healthy + tolerance * float(amplitude)}
+            change = tolerance * float(amplitude)
+            # Factors stay positive.
+            values = {parameter: float(np.exp(change)) if healthy == 1.0 else healthy + change}
             current = with_effect(current, effect, name, values)
     return current
 
@@ -371,7 +381,10 @@ def learn(
     if place is not None:
         comparisons = [prepare(r, station, place) for r in recordings]
         baseline = updated(replace(default_baseline(station), place=place), station)
-    baseline = updated(baseline, _commissioned(comparisons, station, baseline))
+    # How much a channel shares with the reference was learnt with the certificate's response.
+    rounds = 2 if any(isinstance(e, Propeller) for e in station.instruments) else 1
+    for _ in range(rounds):
+        baseline = updated(baseline, _commissioned(comparisons, baseline.station, baseline))
     if progress:
         progress(0.2)
     rows = in_parallel(
