@@ -380,7 +380,7 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
     """Starting points, in the best of the intervals, of effects that the screening hardly sees.
 
     Of those that act on the signals which the last effect there reaches: effects of which the raw
-    signals give a guess, and on the same instrument those that the last one is mistaken for.
+    signals give a guess, and on the same instrument those that one seen there is mistaken for.
 
     Args:
         searcher: The search.
@@ -390,6 +390,7 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
     reached = set(searcher.comparison.affected(searcher.station, last.instrument))
     newest = [one.fit.terms[-1] for one in passing]
     known = {term.key for term in newest if term.interval == last.interval}
+    seen = [t.effect for t in newest if t.key in known and t.instrument == last.instrument]
     starts = {
         key: list(guesses)
         for key, guesses in searcher.guesses.items()
@@ -398,7 +399,9 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
     possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
     for effect in searcher.effects.values():
         key = (effect.name, last.instrument)
-        confusable = effect.name in last.effect.confusable or last.effect.name in effect.confusable
+        confusable = any(
+            effect.name in other.confusable or other.name in effect.confusable for other in seen
+        )
         if confusable and key in possible and key not in starts and not effect.legible:
             drive = searcher.comparison.drive
             starts[key] = [
