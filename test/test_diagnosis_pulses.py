@@ -18,6 +18,11 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
     interval_statistics,
     slot_intervals,
 )
+from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
+    STILLNESS,
+    chance_of_stillness,
+    stillness_statistics,
+)
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.effects.output import slot_values
@@ -27,6 +32,7 @@ from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Pulses
@@ -354,3 +360,34 @@ def test_what_is_small_beside_a_large_effect_on_the_same_signals_mends_its_form(
         terms.append(Term(effect, instrument, {effect.parameters[0].name: value}))
     assert only_makes_good(searcher, terms[0], terms) is mends
     assert not only_makes_good(searcher, terms[0], terms[:1])
+
+
+def test_whether_a_turn_is_a_step_or_none_hangs_on_the_last_digit() -> None:
+    step = np.radians(6.0)
+    speed = np.full(2001, 5.0)
+    usual = np.cumsum(np.tile([step, -step], 1001))[:2001]
+
+    def stillness(share_of_none: float) -> float:
+        moves = np.arange(2000) % 1000 >= 1000.0 * share_of_none
+        series = np.cumsum(np.concatenate(([0.0], np.where(moves, step, 0.0))))
+        # Wind from everywhere alike: the slowest third is any third.
+        return float(stillness_statistics(series, usual, speed + 1e-3 * (np.arange(2001) % 7))[0])
+
+    jump = abs(stillness(0.105) - stillness(0.095))
+    assert jump > 1.0
+    assert jump < 4.0 * chance_of_stillness(1.0, 1.0)[0]
+    assert not np.any(chance_of_stillness(1.0, 0.0))
+
+
+def test_the_null_knows_the_last_digit_where_both_read_in_steps() -> None:
+    steps = catalogue()["quantisation"]
+    coarse = with_effect(STATION, steps, "vane", {"step": 6.0, "origin": 0.0})
+    comparison = prepare(recorded(coarse, 84))
+    as_described, as_found = (
+        trust_of(comparison, comparison.simulate(station), baseline())["vane/vane_angle"]
+        for station in (STATION, coarse)
+    )
+    ratio = as_found.statistics_deviation / as_described.statistics_deviation
+    still = slice(BANDS, BANDS + STILLNESS)
+    assert np.all(ratio[still] > 2.0)
+    assert np.allclose(np.delete(ratio, np.r_[still]), 1.0)

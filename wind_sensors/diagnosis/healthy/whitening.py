@@ -14,6 +14,11 @@ from wind_sensors.diagnosis.comparing.comparison import LOW_END, Comparison, Tru
 from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, chance_of_intervals
+from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
+    ERRATIC,
+    STILLNESS,
+    chance_of_stillness,
+)
 from wind_sensors.diagnosis.healthy.baseline import Baseline, ChannelBaseline
 from wind_sensors.station.model import Rotor, Station
 
@@ -84,13 +89,17 @@ def _trust(
 
 
 def _chance(comparison: Comparison, simulated: Simulated, channel: Channel) -> FloatArray:
-    """Deviation of each statistic by which pulses chance has hit."""
+    """Deviation of each statistic by which pulses chance has hit, and by readings' last digits."""
     drawn, seen = (s.statistics[channel.name] for s in (simulated, comparison.measured))
     chance = np.zeros(drawn.size)
     if channel.kind == "rotor_rate":
         intervals = slice(BANDS, BANDS + INTERVALS)
         edges = comparison.recording.pulses[channel.instrument].time.size
         chance[intervals] = chance_of_intervals(drawn[intervals], seen[intervals], edges)
+    else:
+        stillness = slice(BANDS, BANDS + STILLNESS)
+        steps = BANDS + STILLNESS + ERRATIC
+        chance[stillness] = chance_of_stillness(float(drawn[steps]), float(seen[steps]))
     return chance
 
 

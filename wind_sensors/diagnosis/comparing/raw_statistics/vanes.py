@@ -128,6 +128,25 @@ def stillness_statistics(
     return out
 
 
+COARSE_STILLNESS = 1.5
+"""Standard deviation of the statistics of stillness where all readings come in steps."""
+
+
+def chance_of_stillness(steps: float, other_steps: float) -> FloatArray:
+    """How far `stillness_statistics` of two records may differ by the last digit of readings.
+
+    Where readings come in steps a turn is a whole step or none, and a quantile jumps from one to
+    the other with a few of them. Only steps that both records have are the last digit's.
+
+    Args:
+        steps, other_steps: Of the two records, see `step_statistics`.
+
+    Returns:
+        Standard deviation of each difference.
+    """
+    return np.full(STILLNESS, COARSE_STILLNESS * min(steps, other_steps))
+
+
 def _smallness(turns: FloatArray, usual: FloatArray, shares: tuple[float, ...]) -> FloatArray:
     """Logarithms of quantiles over the 90 % one; neither is less than a part of the usual one."""
     large = float(np.quantile(usual, 0.9)) + 1e-9
