@@ -316,6 +316,16 @@ def test_good_readings_tell_where_a_wiper_floats_and_since_when(
     assert told.interval[1] is None
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_vane_that_reads_nothing_else_in_between_has_no_gap() -> None:
+    stuck = catalogue()["stuck_sensor"]
+    values = {"start": 150.0, "stop": 320.0, "reading": 185.0, "known": 1.0}
+    comparison = prepare(recorded(with_effect(STATION, stuck, "vane", values), 84))
+    guesses = guesses_of(comparison, STATION)
+    assert ("stuck_sensor", "vane") in guesses
+    assert not any(t.held for t in guesses.get(("potentiometer_gap", "vane"), []))
+
+
 def test_a_floating_wiper_that_never_comes_out_on_one_side_tells_no_gap() -> None:
     values = {"centre": 230.0, "width": 80.0, "reading": 0.0, "form": 2.0}
     gap = catalogue()["potentiometer_gap"]

@@ -301,6 +301,8 @@ def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple
 
 def _hole(degrees: FloatArray) -> tuple[float, float] | None:
     """Centre and width of a sector without readings between sectors with many [deg]."""
+    if degrees.size == 0:
+        return None
     counts, _ = np.histogram(np.mod(degrees, 360.0), bins=360, range=(0.0, 360.0))
     # A reading that comes again and again is no wind.
     usual = np.median(counts[counts > 0])
