@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explaining.signatures import Template
 from wind_sensors.diagnosis.healthy.baseline import Baseline
-from wind_sensors.diagnosis.healthy.learning import STANDING_TOLERANCES
+from wind_sensors.diagnosis.healthy.commissioning import STANDING_TOLERANCES
 
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.intp]
