@@ -24,6 +24,9 @@ from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.verdict import diagnose
 
+ICE = {"friction_speed": 0.0, "growth_time": 0.0}
+"""That is there at once and leaves the bearing as it is."""
+
 
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000), several=st.integers(1, 3))
@@ -91,7 +94,7 @@ def test_ice_without_weight_is_a_calibration() -> None:
     drifted = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 0.9})
     searcher = searcher_of(prepare(recorded(drifted, 69)), baseline(), catalogue(), {})
     null = searcher.whitener(searcher.bank.without)
-    ice = Term(catalogue()["icing"], "cup", {"gain": 0.9, "inertia_factor": 1.01})
+    ice = Term(catalogue()["icing"], "cup", {**ICE, "gain": 0.9, "inertia_factor": 1.01})
     weightless = fit(null, STATION, [ice], None, iterations=0)
     (left,) = simplified(searcher, null, weightless).terms
     assert left.key == ("calibration_drift", "cup")
@@ -116,7 +119,7 @@ def test_a_small_effect_that_brings_most_mends_nothing(drift: float, left: bool)
 def test_of_a_healthy_rotor_no_ice_is_left() -> None:
     searcher = searcher_of(prepare(recorded(STATION, 69)), baseline(), catalogue(), {})
     null = searcher.whitener(searcher.bank.without)
-    ice = Term(catalogue()["icing"], "cup", {"gain": 0.97, "inertia_factor": 1.01})
+    ice = Term(catalogue()["icing"], "cup", {**ICE, "gain": 0.97, "inertia_factor": 1.01})
     assert simplified(searcher, null, fit(null, STATION, [ice], None, iterations=0)).terms == ()
 
 

@@ -207,8 +207,9 @@ def test_what_the_recording_does_not_show_is_held_where_it_was() -> None:
     assert without_run_aways(Term(angular, "cup", {"change": 1.95, "skewness": 2.0})) is None
     assert without_run_aways(Term(angular, "cup", {"change": 0.5, "skewness": 0.3})) is None
     # Ice without weight would be another effect.
-    icing = Term(catalogue()["icing"], "cup", {"gain": 0.9, "inertia_factor": 0.8}, ALWAYS)
-    assert without_run_aways(icing) is None
+    ice = catalogue()["icing"]
+    values = {**ice.templates[0], "gain": 0.9, "inertia_factor": 0.8}
+    assert without_run_aways(Term(ice, "cup", values, ALWAYS)) is None
 
 
 @pytest.mark.parametrize(

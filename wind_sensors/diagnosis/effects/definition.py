@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -121,6 +122,8 @@ class Effect:
         loose_statistics: Statistics of the raw signals, by their labels, in which its form is not
             certain: what it leaves there says little against it.
         stirs: It brings eddies of its own where it acts, of which the reference knows nothing.
+        grows: Name of the parameter that says with which time constant it approaches its size;
+            empty: it is there at once.
         needs: Data without which it cannot be seen.
         tie: From values in proportion to the templates', those that act alike where what may be
             `tied` is; None: nothing may be.
@@ -155,6 +158,7 @@ class Effect:
     loose_statistics: frozenset[str] = frozenset()
     standing: float = 0.1
     standing_in_calm: float = 0.0
+    grows: str = ""
     needs: tuple[str, ...] = ()
     tie: Callable[[Values], dict[str, float]] | None = None
     size: Callable[[Values], float] | None = None
@@ -250,6 +254,26 @@ def touched(station: Station, effect: Effect, instrument: str) -> tuple[str, ...
     return tuple(e.name for e in station.instruments if effect.applies(e, station))
 
 
+_STAGES = (0.0, 0.2, 0.45, 0.75, 1.15, 1.7, 2.6)
+"""Times [time constants] at which what grows takes another size."""
+
+
+def _stages(
+    begin: float, end: float | None, constant: float
+) -> Iterator[tuple[float, float | None, float]]:
+    """Beginning and end [s] of each stage of a growth, and its mean share of the full size."""
+    for early, late in zip(_STAGES, (*_STAGES[1:], math.inf), strict=True):
+        start = begin + early * constant
+        if end is not None and start >= end:
+            return
+        if math.isinf(late):
+            yield start, end, 1.0
+            return
+        stop = begin + late * constant
+        share = 1.0 - (math.exp(-early) - math.exp(-late)) / (late - early)
+        yield start, stop if end is None else min(stop, end), share
+
+
 def with_effect(
     station: Station,
     effect: Effect,
@@ -258,14 +282,24 @@ def with_effect(
     interval: tuple[float, float | None] | None = None,
 ) -> Station:
     """The station with an effect, for good or within an interval [s since the start]."""
-    always = interval is None or (interval[0] <= 0.0 and interval[1] is None)
-    changes = []
+    begin, end = (0.0, None) if interval is None else interval
+    growth = values.get(effect.grows, 0.0)
+    changes: list[Change] = []
     for name in touched(station, effect, instrument):
+        if growth > 0.0:
+            changes.extend(
+                Change(
+                    start=start, stop=stop, instrument=name,
+                    set=effect.update(entry_of(station, name), effect.scaled(values, share)),
+                )
+                for start, stop, share in _stages(begin, end, growth)
+            )  # fmt: skip
+            continue
         keys = effect.update(entry_of(station, name), values)
-        if always or interval is None:
+        if begin <= 0.0 and end is None:
             station = with_keys(station, name, keys)
         else:
-            changes.append(Change(start=interval[0], stop=interval[1], instrument=name, set=keys))
+            changes.append(Change(start=begin, stop=end, instrument=name, set=keys))
     if not changes:
         return station
     return station.model_copy(update={"changes": (*station.changes, *changes)})

@@ -72,6 +72,11 @@ class Term:
         return with_effect(station, self.effect, self.instrument, self.values, self.interval)
 
     @property
+    def grows(self) -> bool:
+        """Whether it approaches its size while it holds."""
+        return self.values.get(self.effect.grows, 0.0) > 0.0
+
+    @property
     def relative_size(self) -> float:
         """Size in units of the smallest worth reporting."""
         return self.effect.relative_size(self.values)
@@ -105,9 +110,9 @@ def suggested(effect: str, instrument: str, **values: float) -> Term:
 def planted(station: Station, terms: Sequence[Term]) -> Station:
     """The station with all terms.
 
-    Terms that always hold come first, so that changes build on them.
+    Terms that hold as they are all the time come first, so that changes build on them.
     """
-    for term in sorted(terms, key=lambda t: t.interval != ALWAYS):
+    for term in sorted(terms, key=lambda t: t.interval != ALWAYS or t.grows):
         station = term.planted(station)
     return station
 
