@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from diagnosis_cases import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.fitting import Fit, Term, fit
+from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Change, Station
 
@@ -79,3 +82,19 @@ def test_ice_that_grows_is_told_with_its_time() -> None:
     inertia = finding.parameters["inertia_factor"]
     assert inertia.low < 2.5 < inertia.high
     assert finding.parameters["growth_time"].value == pytest.approx(constant, rel=0.5)
+
+
+def test_ice_makes_no_rotor_lighter() -> None:
+    """A lighter rotor with friction would follow an offset as closely as an offset does."""
+    offset = catalogue()["calibration_offset"]
+    shifted = recorded(with_effect(STATION, offset, "cup", {"offset": -1.2}), 54)
+    searcher = searcher_of(prepare(shifted), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+
+    def fitted(effect: str, **values: float) -> Fit:
+        return fit(null, STATION, [Term(catalogue()[effect], "cup", values)], None)
+
+    true = fitted("calibration_offset", offset=-1.0)
+    ice = fitted("icing", gain=0.93, inertia_factor=1.2, friction_speed=2.0, growth_time=0.0)
+    assert ice.terms[0].values["inertia_factor"] >= 1.0
+    assert ice.cost > true.cost + 12.0

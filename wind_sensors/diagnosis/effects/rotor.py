@@ -286,7 +286,7 @@ ICING = Effect(
     parameters=(
         Parameter("gain", "1", 0.2, 1.0, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(
-            "inertia_factor", "1", 0.8, 12.0, healthy=1.0, minimum=0.4, step=0.1,
+            "inertia_factor", "1", 1.0, 12.0, healthy=1.0, minimum=0.4, step=0.1,
             starts=(1.5, 3.0),
         ),
         Parameter("friction_speed", "m/s", 0.0, 6.0, step=0.1, starts=(1.0,), spare=True),
