@@ -16,7 +16,7 @@ from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Change, Station
 
-FULL = {"gain": 0.9, "inertia_factor": 2.5, "friction_speed": 0.8}
+FULL = {"gain": 0.9, "inertia_factor": 2.5}
 
 
 def iced(growth: float, interval: tuple[float, float | None] | None = None) -> Station:
@@ -68,7 +68,6 @@ def test_ice_that_grows_is_told_with_its_time() -> None:
                     start=float(t), stop=float(t + step), instrument="cup",
                     set={
                         "calibration_gain": 1.0 - 0.1 * s, "inertia_factor": 1.0 + 1.5 * s,
-                        "friction_speed": 0.8 * float(s) ** 0.5,
                     },
                 )
                 for t, s in zip(at, share.tolist(), strict=True)
@@ -85,7 +84,7 @@ def test_ice_that_grows_is_told_with_its_time() -> None:
 
 
 def test_ice_makes_no_rotor_lighter() -> None:
-    """A lighter rotor with friction would follow an offset as closely as an offset does."""
+    """A lighter rotor would follow an offset more closely."""
     offset = catalogue()["calibration_offset"]
     shifted = recorded(with_effect(STATION, offset, "cup", {"offset": -1.2}), 54)
     searcher = searcher_of(prepare(shifted), baseline(), catalogue(), {})
@@ -95,6 +94,6 @@ def test_ice_makes_no_rotor_lighter() -> None:
         return fit(null, STATION, [Term(catalogue()[effect], "cup", values)], None)
 
     true = fitted("calibration_offset", offset=-1.0)
-    ice = fitted("icing", gain=0.93, inertia_factor=1.2, friction_speed=2.0, growth_time=0.0)
+    ice = fitted("icing", gain=0.93, inertia_factor=1.2, growth_time=0.0)
     assert ice.terms[0].values["inertia_factor"] >= 1.0
     assert ice.cost > true.cost + 12.0

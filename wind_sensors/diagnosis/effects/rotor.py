@@ -266,20 +266,19 @@ def _icing(entry: Entry, values: Values) -> dict[str, Any]:
     return {
         "calibration_gain": entry.calibration_gain * values["gain"],
         "inertia_factor": entry.inertia_factor * values["inertia_factor"],
-        "friction_speed": (entry.friction_speed**2 + values.get("friction_speed", 0.0) ** 2) ** 0.5,
     }
 
 
 ICING = Effect(
     name="icing",
     meaning="Ice (above freezing dirt, salt or insects) makes the rotor heavier and its cups or "
-    "blades worse, at the same time; its bearing may become stiff, and all of it may grow.",
+    "blades worse, at the same time; it may grow.",
     entrance="response",
-    equation="l S = gain * U - U0 and l0 = factor * l0_cal together, with friction U_s^2; each "
-    "approaches its size as 1 - exp(-t / growth time)",
+    equation="l S = gain * U - U0 and l0 = factor * l0_cal together; each approaches its size "
+    "as 1 - exp(-t / growth time)",
     source="K94, eq. (6)",
     region="near and below 0 deg C; all speeds and high frequencies",
-    contains=frozenset({"calibration_drift", "rotor_inertia", "bearing_friction"}),
+    contains=frozenset({"calibration_drift", "rotor_inertia"}),
     standing=0.0,
     smooths=True,
     shifts=True,
@@ -289,15 +288,12 @@ ICING = Effect(
             "inertia_factor", "1", 1.0, 12.0, healthy=1.0, minimum=0.4, step=0.1,
             starts=(1.5, 3.0),
         ),
-        Parameter("friction_speed", "m/s", 0.0, 6.0, step=0.1, starts=(1.0,), spare=True),
         Parameter("growth_time", "s", 0.0, 600.0, step=10.0, starts=(100.0,), spare=True),
     ),
     applies=_is_rotor,
     update=_icing,
     grows="growth_time",
-    templates=(
-        {"gain": 0.97, "inertia_factor": 1.3, "friction_speed": 0.0, "growth_time": 0.0},
-    ),
+    templates=({"gain": 0.97, "inertia_factor": 1.3, "growth_time": 0.0},),
     confusable={
         "calibration_drift": "temperature; look at the cups",
         "bearing_friction": "temperature; a run-down test by hand",
