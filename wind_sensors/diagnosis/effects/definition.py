@@ -281,7 +281,10 @@ def with_effect(
     values: Values,
     interval: tuple[float, float | None] | None = None,
 ) -> Station:
-    """The station with an effect, for good or within an interval [s since the start]."""
+    """The station with an effect, for good or within an interval [s since the start].
+
+    What grows becomes several changes, whether or not it has an interval.
+    """
     begin, end = (0.0, None) if interval is None else interval
     growth = values.get(effect.grows, 0.0)
     changes: list[Change] = []

@@ -217,7 +217,7 @@ class Baseline:
         before = {entry.name: entry for entry in self.original.instruments}
         after = {entry.name: entry for entry in self.station.instruments}
         entries = tuple(
-            _commissioned(entry, before.get(entry.name), after.get(entry.name))
+            _as_commissioned(entry, before.get(entry.name), after.get(entry.name))
             for entry in station.instruments
         )
         return replace(
@@ -295,7 +295,7 @@ def _unlisted(values: list[float | None]) -> FloatArray:
     return np.array([np.inf if v is None else v for v in values])
 
 
-def _commissioned(
+def _as_commissioned(
     entry: AnyInstrument, before: AnyInstrument | None, after: AnyInstrument | None
 ) -> AnyInstrument:
     """An instrument with the differences that commissioning found on its namesake."""
