@@ -26,9 +26,9 @@ from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.effects.output import slot_values
-from wind_sensors.diagnosis.explaining.acceptance import only_makes_good
+from wind_sensors.diagnosis.explaining.acceptance import inexactness, only_makes_good, overlap
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import searcher_of
@@ -39,6 +39,7 @@ from wind_sensors.station.signals import Pulses
 
 FloatArray = npt.NDArray[np.float64]
 
+LOST_BY_CHANCE = {"dead_time": 0.0, "loss_probability": 0.2, "loss_growth": 0.0}
 SLOTS = 10
 TURNS = 900
 TURN = 0.4
@@ -402,3 +403,52 @@ def test_the_null_knows_the_last_digit_where_both_read_in_steps() -> None:
     still = slice(BANDS, BANDS + STILLNESS)
     assert np.all(ratio[still] > 2.0)
     assert np.allclose(np.delete(ratio, np.r_[still]), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "counted"),
+    [
+        ("missed_pulses", LOST_BY_CHANCE, 0.8),
+        # These bounces are told from edges, and not counted.
+        ("extra_pulses", {"bounce_probability": 0.2, "bounce_delay": 0.0005}, 1.0),
+    ],
+)
+def test_what_chance_does_to_slow_rates_is_known(
+    effect: str, values: dict[str, float], counted: float
+) -> None:
+    changed = with_effect(STATION, catalogue()[effect], "cup", values)
+    seen = []
+    for seed in range(6):
+        # The same wind and the same noise; only the draws differ.
+        whole, drawn = (prepare(recorded(s, seed)) for s in (STATION, changed))
+        hit = [c.measured.cosine["cup/rotor_rate"] for c in (drawn, whole)]
+        seen.append((hit[0] - counted * hit[1])[1:150] ** 2)
+    told = drawn.simulate(changed)
+    assert told.chance["cup/rotor_rate"] == pytest.approx(np.mean(seen), rel=0.25, abs=1e-3)
+    assert not drawn.simulate(STATION).chance
+    # It does not stay where another effect takes the place of that one.
+    assert not told.with_others(drawn.simulate(STATION)).chance
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "shared"),
+    [
+        ("missed_pulses", LOST_BY_CHANCE, 1.0),
+        ("extra_pulses", {"bounce_probability": 0.2, "bounce_delay": 0.0005}, 0.0),
+    ],
+)
+def test_bounces_that_are_told_from_edges_leave_the_rate_to_other_effects(
+    effect: str, values: dict[str, float], shared: float
+) -> None:
+    pulses = Term(catalogue()[effect], "cup", values)
+    offset = Term(catalogue()["calibration_offset"], "cup", {"offset": -0.4})
+    both = planted(STATION, (pulses, offset))
+    searcher = searcher_of(prepare(recorded(both, 27)), baseline(), catalogue(), {})
+    null = searcher.whitener(searcher.bank.without)
+    one, two = (
+        fit(null, searcher.station, terms, searcher.bank.without, iterations=0)
+        for terms in ((pulses,), (pulses, offset))
+    )
+    assert overlap(searcher, one, two) == pytest.approx(shared, abs=0.02)
+    needed = inexactness(searcher, null, one, two)
+    assert (needed > 0.0) == (shared > 0.0)

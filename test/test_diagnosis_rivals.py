@@ -19,13 +19,20 @@ from wind_sensors.diagnosis.explaining.explanation import (
 )
 from wind_sensors.diagnosis.explaining.fitting import Term, fit
 from wind_sensors.diagnosis.explaining.moves import merged
-from wind_sensors.diagnosis.explaining.naming import kept_if_better, name, named_alone
+from wind_sensors.diagnosis.explaining.naming import (
+    kept_if_better,
+    name,
+    named_alone,
+    named_instead,
+)
 from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving import findings
 from wind_sensors.diagnosis.proving.findings import equal_explanations
+from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of
 from wind_sensors.diagnosis.regions import region_bank, strongest
+from wind_sensors.diagnosis.verdict import first_claim
 from wind_sensors.station.model import Station
 
 DISTORTION = {
@@ -164,3 +171,46 @@ def test_what_was_known_before_stays_if_it_fits_clearly_better() -> None:
     kept = kept_if_better(searcher, right, nothing)
     assert [t.key for t in kept.fit.terms] == [heavy.key]
     assert kept_if_better(searcher, wrong, nothing) is nothing
+
+
+def _rivalled() -> tuple[Searcher, Naming]:
+    """A rotor that reads less, explained by that; an offset fits nearly as well."""
+    slow = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 0.93})
+    searcher = searcher_of(prepare(recorded(slow, 94)), baseline(), catalogue(), {})
+    found = name(searcher, first_round(searcher))
+    offset = Term(catalogue()["calibration_offset"], "cup", {"offset": -0.4})
+    rival = fit(found.whitener, STATION, [offset], searcher.bank.without)
+    further = Alternative(found.fit, 30.0)
+    return searcher, replace(found, alternatives=(Alternative(rival, 8.0), further))
+
+
+@pytest.mark.parametrize("contradicted", [True, False])
+def test_a_rival_is_judged_where_the_signals_contradict_the_effect_that_led(
+    contradicted: bool,
+) -> None:
+    searcher, led = _rivalled()
+    assert [t.effect.name for t in led.fit.terms] == ["calibration_drift"]
+    of_leader = judgement_of(searcher, led, baseline(), 1, lambda phase: lambda share: None, False)
+    asked: list[str] = []
+
+    def judge(naming: Naming) -> Judgement:
+        asked.append(naming.fit.terms[0].effect.name)
+        if naming is led:
+            return replace(of_leader, verdict="unknown", contradicted=contradicted)
+        return replace(of_leader, naming=naming, verdict="named", contradicted=False)
+
+    judged = first_claim(searcher, led, judge)
+    if contradicted:
+        assert asked == ["calibration_drift", "calibration_offset"]
+        assert judged.naming.fit.terms[0].effect.name == "calibration_offset"
+    else:
+        assert asked == ["calibration_drift"]
+        assert not judged.is_claim
+
+
+def test_what_lost_against_the_first_is_as_far_behind_the_rival_in_its_place() -> None:
+    searcher, led = _rivalled()
+    instead = named_instead(searcher, led, led.alternatives[0])
+    assert [t.effect.name for t in instead.fit.terms] == ["calibration_offset"]
+    assert [a.behind for a in instead.alternatives] == [22.0]
+    assert instead.gain < led.gain

@@ -97,3 +97,19 @@ def test_what_is_slow_does_not_raise_the_noise_above_it() -> None:
     ratio = np.ones(spectra.band_edges(2000).size - 1)
     plain, disturbed = (spectra.noise_variance(r, ratio, 36) for r in (residual, slow))
     assert disturbed == pytest.approx(plain)
+
+
+def test_what_chance_adds_to_slow_noise_is_not_in_the_ratio_of_healthy_days() -> None:
+    # Healthy noise is slow here by a factor of four less; chance adds as much as it has above.
+    edges = spectra.band_edges(2000)
+    ratio = np.full(edges.size - 1, 0.25)
+    squares: dict[float, list[np.ndarray]] = {0.0: [], 1.0: []}
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        healthy = rng.standard_normal(2000) * np.where(np.arange(2000) < 36, 0.5, 1.0)
+        residual = healthy + rng.standard_normal(2000)
+        for by_chance, found in squares.items():
+            variance = spectra.noise_variance(residual, ratio, 36, by_chance)
+            found.append((residual**2 / variance)[:30])
+    assert np.mean(squares[1.0]) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(squares[0.0]) > 2.0

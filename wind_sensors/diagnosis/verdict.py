@@ -15,14 +15,19 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
-from wind_sensors.diagnosis.explaining.naming import kept_if_better, name, named_alone
+from wind_sensors.diagnosis.explaining.naming import (
+    kept_if_better,
+    name,
+    named_alone,
+    named_instead,
+)
 from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
 from wind_sensors.diagnosis.proving.decision import Verdict
-from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
-from wind_sensors.diagnosis.proving.judging import judgement_of, with_suspicion
+from wind_sensors.diagnosis.proving.findings import Finding, Unexplained, equal_explanations
+from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of, with_suspicion
 from wind_sensors.diagnosis.regions import Found, RegionBank
 from wind_sensors.diagnosis.smallest_size import SmallestSize, smallest_size
 from wind_sensors.station.model import Angle, Rotor, Station
@@ -153,6 +158,33 @@ def _to_plant_on(baseline: Baseline, named: Sequence[Term]) -> Station:
     return station
 
 
+def first_claim(
+    searcher: Searcher, naming: Naming, judge: Callable[[Naming], Judgement]
+) -> Judgement:
+    """What is to be said of a recording, by the first explanation of it that may be claimed.
+
+    Args:
+        searcher: The search.
+        naming: The explanation that leads.
+        judge: Judges one.
+    """
+    judged = judge(naming)
+    if judged.is_claim:
+        return judged
+    # A second effect that does not hold must not take the first one along.
+    alone = named_alone(searcher, naming)
+    if alone is not None:
+        single = judge(alone)
+        if single.is_claim:
+            return single
+    if judged.contradicted:
+        for _, rival in equal_explanations(naming):
+            instead = judge(named_instead(searcher, naming, rival))
+            if instead.is_claim:
+                return instead
+    return judged
+
+
 def diagnose(
     recording: Recording,
     baseline: Baseline,
@@ -204,13 +236,11 @@ def diagnose(
             searcher, naming = _explained(comparison.within(follows), search, report)
             comparison = searcher.comparison
             naming = kept_if_better(searcher, before, naming)
-    judged = judgement_of(searcher, naming, baseline, workers, report, with_proof)
-    if not judged.is_claim:
-        # A second effect that does not hold must not take the first one along.
-        alone = named_alone(searcher, naming)
-        if alone is not None:
-            single = judgement_of(searcher, alone, baseline, workers, report, with_proof)
-            judged = single if single.is_claim else judged
+    judged = first_claim(
+        searcher,
+        naming,
+        lambda each: judgement_of(searcher, each, baseline, workers, report, with_proof),
+    )
     judged = with_suspicion(judged, baseline.station, workers)
     naming = judged.naming
     named = naming.fit.terms if judged.is_claim else ()

@@ -7,7 +7,7 @@ which `comparison` compares.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -58,6 +58,8 @@ class Simulated:
         levels: By channel name: logarithm of the power of quick eddies in each segment, shape
             (bands, segments).
         counted: Segments that count, shape (segments,).
+        chance: By channel name: variance that pulses lost or bouncing by chance add to each slow
+            coefficient; a channel that has none is left out.
     """
 
     cosine: dict[str, FloatArray]
@@ -65,6 +67,7 @@ class Simulated:
     statistics: dict[str, FloatArray]
     levels: dict[str, FloatArray]
     counted: npt.NDArray[np.bool_]
+    chance: dict[str, float] = field(default_factory=dict)
 
     def with_others(self, others: Simulated) -> Simulated:
         """The same with channels taken from another."""
@@ -74,6 +77,7 @@ class Simulated:
             {**self.statistics, **others.statistics},
             {**self.levels, **others.levels},
             self.counted,
+            {**{k: v for k, v in self.chance.items() if k not in others.series}, **others.chance},
         )
 
     def activity(self, channel: str) -> FloatArray:
@@ -162,10 +166,31 @@ class View:
             ),
             change_statistics(drawn, self.speed, self.mask),
         )
-        if on_average is not None:
-            series = rate_series(on_average, rotor, self.grid)
-            cosine = self._cosine(series)
-        return self._of_one(channel, series, cosine, statistics, drawn)
+        if on_average is None:
+            return self._of_one(channel, series, cosine, statistics, drawn)
+        series = rate_series(on_average, rotor, self.grid)
+        cosine = self._cosine(series)
+        seen = self._of_one(channel, series, cosine, statistics, drawn)
+        return replace(seen, chance={channel.name: self._chance(on_average, rotor)})
+
+    def _chance(self, on_average: Pulses, rotor: Rotor) -> float:
+        """Variance that edges drawn one by one add to each slow coefficient of a rate.
+
+        Args:
+            on_average: Edges, with as many turns each as chance makes of it; without turns chance
+                takes no part.
+            rotor: Whose they are.
+        """
+        if on_average.turns is None:
+            return 0.0
+        counted = np.diff(on_average.turns, prepend=0.0) * rotor.pulses_per_revolution
+        share = counted % 1.0
+        way = 2.0 * np.pi * rotor.calibration_distance / rotor.pulses_per_revolution
+        ones = self.masked(np.ones(self.grid.n))
+        at = self.grid.seconds(on_average.time)
+        weight = np.interp(at, self.grid.centres, ones, left=0.0, right=0.0)
+        drawn = float(np.sum(weight**2 * share * (1.0 - share)))
+        return drawn * way**2 / (self.grid.n * self.grid.dt**2)
 
     def _vane(self, channel: Channel, readings: Angles) -> Simulated:
         expected = self.expected.get(channel.name)

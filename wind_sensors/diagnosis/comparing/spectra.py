@@ -22,6 +22,9 @@ _FIRST_BAND = 6
 _CHI_SQUARE_MEDIAN = 0.4549
 _LEAST = 1e-12
 
+LEAST_USUAL = 0.1
+"""Share of the noise above the slow coefficients that chance is not taken to make."""
+
 _CAP = 4.0
 _CAPPED_MEAN = 0.9205
 _TURNS = 4
@@ -189,7 +192,7 @@ def shrinkage(coherence: Coherence, exponent: FloatArray, n: int) -> FloatArray:
 
 
 def noise_variance(
-    residual: FloatArray, low_ratio: FloatArray | None, low_end: int
+    residual: FloatArray, low_ratio: FloatArray | None, low_end: int, by_chance: float = 0.0
 ) -> FloatArray:
     """Smooth, robust variance of the coefficients of a residual.
 
@@ -203,6 +206,7 @@ def noise_variance(
         low_ratio: Healthy variance of each band relative to the first band above `low_end`; None
             keeps the recording's own.
         low_end: First coefficient whose own residual is trusted.
+        by_chance: White part of the variance of which healthy recordings know nothing.
     """
     n = len(residual)
     edges = band_edges(n)
@@ -213,6 +217,7 @@ def noise_variance(
     variance[first:] = smoothed_bands(variance[first:], edges[first:])
     if low_ratio is not None:
         level = float(np.exp(np.mean(np.log(variance[first : first + 3]))))
-        variance[:first] = level * low_ratio[:first]
+        usual = max(level - by_chance, LEAST_USUAL * level)
+        variance[:first] = usual * low_ratio[:first] + by_chance
     full = np.exp(spread_over(np.log(np.maximum(variance, _LEAST)), edges, n))
     return np.asarray(full)

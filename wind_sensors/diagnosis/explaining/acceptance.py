@@ -72,7 +72,9 @@ ALIKE = 0.05
 this share of all that they change, in squares."""
 
 TRACE = 0.01
-"""An effect acts where it changes a signal by more than this share of its largest change."""
+ROUNDING = 1e-6
+"""An effect acts where it changes a signal by more than this share of its largest change, and than
+the second [m/s]: bounces that are told from edges leave the rate as it is."""
 
 PASSING_BESIDE = 3.0
 """So many times more, if it begins or ends inside the record: effects grow and fade themselves."""
@@ -222,7 +224,7 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
     if is_its_moment(searcher, current, further):
         return np.inf
     own = times_beside(further) * inexact(searcher, whitener, current, longer)
-    return max(own, LEAST_BESIDE_GAIN)
+    return max(own, LEAST_BESIDE_GAIN) if own > 0.0 else 0.0
 
 
 def _brings_most(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> bool:
@@ -332,7 +334,8 @@ def overlap(searcher: Searcher, fewer: Fit, more: Fit) -> float:
         name = channel.name
         acts = np.abs(fewer.simulated.series[name] - searcher.bank.without.series[name])
         changed = (more.simulated.series[name] - fewer.simulated.series[name]) ** 2
-        there += float(np.sum(changed[acts > TRACE * float(acts.max(initial=0.0))]))
+        least = max(TRACE * float(acts.max(initial=0.0)), ROUNDING)
+        there += float(np.sum(changed[acts > least]))
         everywhere += float(np.sum(changed))
     return there / everywhere if everywhere > 0.0 else 1.0
 

@@ -134,6 +134,23 @@ def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:
     return _settled(searcher, single, naming.alone.alternatives, naming.screened)
 
 
+def named_instead(searcher: Searcher, naming: Naming, rival: Alternative) -> Naming:
+    """The explanation by a rival, where the signals contradict the one that led.
+
+    Args:
+        searcher: The search.
+        naming: The explanation that led.
+        rival: One of those that lost against it.
+    """
+    others = tuple(
+        replace(other, behind=other.behind - rival.behind)
+        for other in naming.alternatives
+        if other is not rival
+    )
+    known = seen_in(naming.whitener, rival.fit)
+    return _settled(searcher, known, others, naming.screened)
+
+
 def _greedy(
     searcher: Searcher,
     progress: Callable[[float], None] | None,

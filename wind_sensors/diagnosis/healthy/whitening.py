@@ -73,7 +73,10 @@ def _trust(
     coherence, slope, residual = residual_of(comparison, simulated, known, channel)
     low_end = int(2.0 * comparison.grid.n * comparison.grid.dt * LOW_END)
     variance = spectra.noise_variance(
-        residual, known.low_ratio_at(coherence.frequency), low_end
+        residual,
+        known.low_ratio_at(coherence.frequency),
+        low_end,
+        simulated.chance.get(channel.name, 0.0),
     )
     mean_speed = float(np.mean(comparison.speed))
     by_chance = _chance(comparison, simulated, channel)

@@ -76,6 +76,8 @@ class Judgement:
         bank: Regions.
         regions_before: The strongest of them without any effect.
         regions: What is left, for people.
+        contradicted: Whether the signals contradict the form of what is explained by: what fits as
+            well may be true.
     """
 
     naming: Naming
@@ -89,6 +91,7 @@ class Judgement:
     bank: RegionBank
     regions_before: tuple[Found, ...]
     regions: tuple[Found, ...]
+    contradicted: bool = False
 
     @property
     def is_claim(self) -> bool:
@@ -159,9 +162,10 @@ def judgement_of(
     } else ()  # fmt: skip
     report("proving")(1.0)
     structured = located(naming, bank, comparison, baseline).is_structure
-    verdict, findings, objection = _upheld(
+    upheld = _upheld(
         verdict, findings, naming, comparison, baseline.station, structured, workers
     )
+    verdict = upheld.verdict
     if verdict == "none" and comparison.repeated > REPEATED:
         # The instruments are well, but the recording is not.
         verdict = "unknown"
@@ -170,8 +174,8 @@ def judgement_of(
     return Judgement(
         naming=naming,
         verdict=verdict,
-        findings=findings,
-        objection=objection,
+        findings=upheld.findings,
+        objection=upheld.objection,
         remainder=remainder,
         excess=excess,
         calm=calm,
@@ -179,6 +183,7 @@ def judgement_of(
         bank=bank,
         regions_before=tuple(before),
         regions=tuple(_structured(before) if verdict == "unknown" else after),
+        contradicted=upheld.contradicted,
     )
 
 
@@ -217,6 +222,21 @@ def _noise_left(naming: Naming, baseline: Baseline) -> Excess:
     return max(found, key=lambda excess: excess.score)
 
 
+@dataclass(frozen=True)
+class _Upheld:
+    """What stands of a verdict, and what speaks against it, for people.
+
+    Attributes:
+        verdict, findings, objection: As in a judgement.
+        contradicted: As there.
+    """
+
+    verdict: Verdict
+    findings: tuple[Finding, ...] = ()
+    objection: str = ""
+    contradicted: bool = False
+
+
 def _upheld(
     verdict: Verdict,
     findings: tuple[Finding, ...],
@@ -225,19 +245,20 @@ def _upheld(
     station: Station,
     structured: bool,
     workers: int,
-) -> tuple[Verdict, tuple[Finding, ...], str]:
-    """Verdict and findings after what speaks against them, and what does, for people.
+) -> _Upheld:
+    """Verdict and findings after what speaks against them.
 
     What was only said of a part of the record, brought little and is withdrawn, leaves nothing if
     the recording shows no more than healthy ones do: of the many intervals some fit the swings of a
     healthy vane.
     """
     if not findings:
-        return verdict, (), ""
+        return _Upheld(verdict)
     names = " and ".join(_names(naming.fit.terms))
     passing = any(t.interval != ALWAYS for t in naming.fit.terms)
     something = structured or not passing or naming.gain > UNSEEN_NOISY_GAIN
     left: Verdict = "unknown" if something else "none"
+    contradiction = ""
     if not borne_out(findings):
         left = left if stands_out(findings) else "none"
         objection = "blocks that were not fitted do not bear it out"
@@ -249,20 +270,27 @@ def _upheld(
     elif undo_each_other(naming, station):
         objection = "each would have to undo what the other does"
     elif varies(naming, station):
-        objection = "with another size in parts of the record"
+        objection = contradiction = "with another size in parts of the record"
     elif (suspicion := suspicion_of(naming, station, workers)) is not None:
         left, objection = "unknown", suspicion.words
-    elif is_uneven(naming, station):
-        objection = "with another size in lively minutes than in quiet ones"
-    elif goes_with_speed(naming, station):
-        objection = "with another size in strong wind than in weak wind"
-    elif is_discordant(naming, station):
-        objection = "with another size on one signal than on another"
+    elif contradiction := _contradiction(naming, station):
+        objection = contradiction
     elif not determined(findings):
         objection = "of any size, nought among them"
     else:
-        return verdict, findings, ""
-    return left, (), f"{names} would fit, but {objection}"
+        return _Upheld(verdict, findings)
+    return _Upheld(left, (), f"{names} would fit, but {objection}", bool(contradiction))
+
+
+def _contradiction(naming: Naming, station: Station) -> str:
+    """How the signals contradict that an effect has one size; empty: they do not."""
+    if is_uneven(naming, station):
+        return "with another size in lively minutes than in quiet ones"
+    if goes_with_speed(naming, station):
+        return "with another size in strong wind than in weak wind"
+    if is_discordant(naming, station):
+        return "with another size on one signal than on another"
+    return ""
 
 
 def _names(terms: Sequence[Term]) -> list[str]:
