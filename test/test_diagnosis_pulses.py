@@ -32,6 +32,7 @@ from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.vane_guesses import hole_between
 from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
@@ -183,6 +184,16 @@ def test_a_vane_that_reads_in_steps_has_no_gap_where_it_reads() -> None:
     assert ruled_out(stepped, STATION, [term])
     assert not ruled_out(real, STATION, [term])
     assert not ruled_out(stepped, STATION, [Term(gap, "vane", {**gapped, "form": 2.0})])
+
+
+def test_readings_a_last_digit_off_whole_degrees_bound_the_hole_between_them() -> None:
+    lowest = np.nextafter(115.0, 0.0)
+    steps = np.array([lowest, 125.0, 135.0, 145.0, 155.0, 165.0, 175.0, -175.0])
+    found = hole_between(np.repeat(steps, [426, 4662, 3665, 2243, 3936, 2729, 337, 2]))
+    assert found is not None
+    centre, width = found
+    assert width == pytest.approx(10.0)
+    assert centre % 10.0 == pytest.approx(0.0, abs=1e-6) or centre % 10.0 > 9.999
 
 
 def test_the_gap_of_a_vane_that_counts_backwards_is_looked_for_on_its_other_side() -> None:

@@ -117,7 +117,7 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
     if not out:
         out.extend(_coarse_for_a_while(comparison, vane))
     common = values[counts > max(0.004 * readings.size, 20)]
-    hole = _hole(degrees)
+    hole = hole_between(degrees)
     if hole is not None:
         out.append(_gap(vane, *hole))
     if 1 <= common.size <= 3:
@@ -127,7 +127,7 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
             there = np.abs(np.degrees(delivered) - low) < SAME_VALUE
             sectors = [_sector(comparison, channel, there), *([hole] if hole else beside)]
             out.extend(_gap(vane, *sector, 1, low) for sector in sectors)
-            out.extend(_told_gap(comparison, vane, there, _hole, low))
+            out.extend(_told_gap(comparison, vane, there, hole_between, low))
             out.extend(_gap(vane, *sector) for sector in sectors)
         else:
             width = high - low
@@ -299,7 +299,7 @@ def _sector(comparison: Comparison, channel: Channel, where: BoolArray) -> tuple
     return float(np.degrees(centre) + middle), float(np.clip(high - low, 3.0, 90.0))
 
 
-def _hole(degrees: FloatArray) -> tuple[float, float] | None:
+def hole_between(degrees: FloatArray) -> tuple[float, float] | None:
     """Centre and width of a sector without readings between sectors with many [deg]."""
     if degrees.size == 0:
         return None
@@ -316,7 +316,8 @@ def _hole(degrees: FloatArray) -> tuple[float, float] | None:
         peopled = all(np.sum(counts[np.mod(at, 360)]) > least for at in beside)
         if peopled and NARROWEST_HOLE <= end - begin <= WIDEST_HOLE:
             away = np.mod(degrees - 0.5 * (begin + end) + 180.0, 360.0) - 180.0
-            half = 0.5 * (end - begin)
+            # Readings in whole degrees lie on the borders of bins, but for their last digits.
+            half = 0.5 * (end - begin) - SAME_VALUE
             low, high = float(away[away < -half].max()), float(away[away >= half].min())
             if not found or high - low > found[1]:
                 found = float((0.5 * (begin + end + low + high)) % 360.0), high - low
