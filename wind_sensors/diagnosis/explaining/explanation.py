@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, Term, fit
 from wind_sensors.diagnosis.explaining.search import (
     PENALTY_PER_FURTHER_PARAMETER,
-    PENALTY_PER_INTERVAL,
     PENALTY_PER_PARAMETER,
     Searcher,
+    interval_cost,
 )
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -34,12 +34,7 @@ def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
     """What parameters and intervals cost; a term's second parameter costs more than its first."""
     firsts = min(len(terms), parameters)
     cost = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
-    for term in terms:
-        if term.interval != ALWAYS and not term.effect.legible:
-            cost += PENALTY_PER_INTERVAL * sum(
-                (term.interval[0] > 0.0, term.interval[1] is not None)
-            )
-    return cost
+    return cost + sum(interval_cost(term) for term in terms)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,14 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.bounds import without_idle, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import (
+    ALWAYS,
+    ROUGHLY,
+    Fit,
+    Term,
+    fit,
+    planted,
+)
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
@@ -77,6 +84,14 @@ PENALTY_PER_FURTHER_PARAMETER = 4.0
 
 PENALTY_PER_INTERVAL = 10.0
 """Cost of a beginning or an end inside the record."""
+
+
+def interval_cost(term: Term) -> float:
+    """What a term's beginning and end cost; nought where the signals tell them."""
+    if term.interval == ALWAYS or term.effect.legible:
+        return 0.0
+    begin, end = term.interval
+    return PENALTY_PER_INTERVAL * ((begin > 0.0) + (end is not None))
 
 
 @dataclass
@@ -278,9 +293,15 @@ class Searcher:
             ]  # fmt: skip
         ahead = fits[0]
         if len(fits) > 1 and smooths:
-            ahead = min(fits, key=lambda f: self.whitener(f.simulated).deviance(f.simulated))
+            ahead = min(
+                fits,
+                key=lambda f: (
+                    interval_cost(f.terms[-1])
+                    + self.whitener(f.simulated).deviance(f.simulated)
+                ),
+            )
         elif len(fits) > 1:
-            ahead = min(fits, key=lambda f: f.cost)
+            ahead = min(fits, key=lambda f: f.cost + interval_cost(f.terms[-1]))
         found = fit(
             whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
         )
