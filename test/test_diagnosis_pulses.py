@@ -88,6 +88,28 @@ def test_slots_are_followed_past_lost_and_doubled_edges(
     assert right >= followed * records
 
 
+def test_of_very_many_edges_some_tell_as_much_as_all() -> None:
+    rng = np.random.default_rng(5)
+    slots, turn = 40, 0.02
+    cup = STATION.instrument("cup").model_copy(update={"pulses_per_revolution": slots})
+    assert isinstance(cup, Cup)
+    speed = 2.0 * np.pi * cup.calibration_distance / turn
+    displaced = 0.1 * rng.standard_normal(slots)
+    found = []
+    for turns in (4_000, 12_000):  # read in full, and in part
+        place = np.arange(turns * slots) + np.tile(displaced, turns)
+        # Bounces do not slip the count of slots; lost edges may.
+        bounced = place[rng.random(place.size) < 0.002] + 0.03
+        time = np.sort(np.concatenate((place, bounced))) * turn / slots
+        grid = Grid(0, 0.2, int(turns * turn / 0.2))
+        calm = np.zeros(grid.n)
+        edges = Pulses(np.rint(time * 1e9).astype(np.int64))
+        found.append(interval_statistics(edges, cup, calm, calm + speed, grid))
+    assert found[1][:3] == pytest.approx(found[0][:3], rel=0.05, abs=2e-4)
+    assert found[0][1] > 0.001
+    assert found[0][2] > 0.1
+
+
 def test_slots_that_become_uneven_show_from_then_on() -> None:
     displaced = 0.05 * np.random.default_rng(3).standard_normal(SLOTS)
     cuts = np.linspace(0.0, TURNS * TURN, 13)

@@ -47,6 +47,11 @@ gaps of no more than so many seconds."""
 LOST_TURNS = 10.0
 """In a silence of so many turns, as they are before and after it, nobody counts slots."""
 
+MOST_READ = 200_000
+BLOCK_TURNS = 64
+"""Of more edges only some are read, in blocks of so many turns evenly over the record: they tell as
+much as chance lets all of them tell."""
+
 SLOW_TURN = 2.5
 """A rotor that takes so many times longer for its turns than the wind asks for is about to stop:
 its intervals tell of the wind that it stops in."""
@@ -125,8 +130,15 @@ def chance_of_intervals(one: FloatArray, other: FloatArray, edges: int) -> Float
         Standard deviation of each difference.
     """
     hit = min(float(np.minimum(one[:2], other[:2]).sum()), 1.0)
-    deviation = math.sqrt(2.0 * hit * (1.0 - hit) / max(edges, 1))
+    read = edges / _every(edges)
+    deviation = math.sqrt(2.0 * hit * (1.0 - hit) / max(read, 1.0))
     return np.full(INTERVALS, deviation)
+
+
+@compiled
+def _every(edges: int) -> int:
+    """One of so many blocks of a record's edges is read."""
+    return max((edges + MOST_READ - 1) // MOST_READ, 1)
 
 
 @compiled
@@ -149,19 +161,21 @@ def _interval_statistics(
     counted = 0
     bins_per_second = 1.0 / dt
     last_bin = weight.size - 1
-    for i in range(window, edges - 1 - window):
-        place = min(max(int(time[i] * bins_per_second), 0), last_bin)
-        if weight[place] <= 0.5:
-            continue
-        around = time[i + half + 1] - time[i - half]
-        if around > longest[place] * window:
-            continue
-        interval = (time[i + 1] - time[i]) * window
-        counted += 1
-        if interval > LONG * around:
-            long += 1
-        elif interval < SHORT * around:
-            short += 1
+    block = BLOCK_TURNS * slots
+    for begin in range(window, edges - 1 - window, _every(edges) * block):
+        for i in range(begin, min(begin + block, edges - 1 - window)):
+            place = min(max(int(time[i] * bins_per_second), 0), last_bin)
+            if weight[place] <= 0.5:
+                continue
+            around = time[i + half + 1] - time[i - half]
+            if around > longest[place] * window:
+                continue
+            interval = (time[i + 1] - time[i]) * window
+            counted += 1
+            if interval > LONG * around:
+                long += 1
+            elif interval < SHORT * around:
+                short += 1
     if counted < 100:
         return out
     out[0] = long / counted
@@ -277,28 +291,30 @@ def _slot_statistics(
     wind[:, 0], wind[:, 1] = np.cos(direction), np.sin(direction)
     wind[:, 2], wind[:, 3] = np.cos(2.0 * direction), np.sin(2.0 * direction)
     first = slots // 2
-    slot = first - 1
     kept = 0
-    for j in range(edges - slots):
-        i = j + first
-        slot = 0 if slot + 1 == slots else slot + 1
-        if np.isnan(time[i] + time[i + 1] + time[j] + time[j + slots]):
-            continue
-        place = min(max(int(time[i] * bins_per_second), 0), last_bin)
-        if weight[place] <= 0.5:
-            continue
-        revolution = max(time[j + slots] - time[j], 1e-9)
-        if revolution > longest[place] * slots:
-            continue
-        deviation = (time[i + 1] - time[i]) * slots / revolution - 1.0
-        deviation = min(max(deviation, -0.8), 0.8)
-        squares += deviation * deviation
-        kept += 1
-        number[slot, 0] += 1.0
-        total[slot, 0] += deviation
-        for m in range(4):
-            number[slot, m + 1] += wind[place, m]
-            total[slot, m + 1] += deviation * wind[place, m]
+    block = BLOCK_TURNS * slots
+    for begin in range(0, edges - slots, _every(edges) * block):
+        slot = (begin + first - 1) % slots
+        for j in range(begin, min(begin + block, edges - slots)):
+            i = j + first
+            slot = 0 if slot + 1 == slots else slot + 1
+            if np.isnan(time[i] + time[i + 1] + time[j] + time[j + slots]):
+                continue
+            place = min(max(int(time[i] * bins_per_second), 0), last_bin)
+            if weight[place] <= 0.5:
+                continue
+            revolution = max(time[j + slots] - time[j], 1e-9)
+            if revolution > longest[place] * slots:
+                continue
+            deviation = (time[i + 1] - time[i]) * slots / revolution - 1.0
+            deviation = min(max(deviation, -0.8), 0.8)
+            squares += deviation * deviation
+            kept += 1
+            number[slot, 0] += 1.0
+            total[slot, 0] += deviation
+            for m in range(4):
+                number[slot, m + 1] += wind[place, m]
+                total[slot, m + 1] += deviation * wind[place, m]
     if kept < 100:
         return out
     means = total[:, 0] / np.maximum(number[:, 0], 1.0)
