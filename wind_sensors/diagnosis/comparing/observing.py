@@ -171,9 +171,9 @@ class View:
         series = rate_series(on_average, rotor, self.grid)
         cosine = self._cosine(series)
         seen = self._of_one(channel, series, cosine, statistics, drawn)
-        return replace(seen, chance={channel.name: self._chance(on_average, rotor)})
+        return replace(seen, chance={channel.name: self._variance_by_chance(on_average, rotor)})
 
-    def _chance(self, on_average: Pulses, rotor: Rotor) -> float:
+    def _variance_by_chance(self, on_average: Pulses, rotor: Rotor) -> float:
         """Variance that edges drawn one by one add to each slow coefficient of a rate.
 
         Args:
