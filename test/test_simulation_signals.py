@@ -20,6 +20,7 @@ from wind_sensors.simulation import (
     angle_readings,
     edge_times,
     expected_signals,
+    passed_slots,
     random_numbers,
     respond,
 )
@@ -277,7 +278,7 @@ def test_a_circuit_fed_in_blocks_gives_what_it_gives_at_once(electronics):
     draw = np.random.default_rng(8)
     wind = np.stack((5 + draw.normal(size=401), np.zeros(401), np.zeros(401)), axis=1)
     whole = respond(station, Drive(START, 0.05, wind))
-    at_once = PulseCircuit("cup", START, 5).edges(whole)
+    at_once = PulseCircuit("cup", START, 5).edges(passed_slots(whole, "cup"))
     circuit, state, parts = PulseCircuit("cup", START, 5), None, []
     for first in range(0, 400, 80):
         drive = Drive(
@@ -285,7 +286,7 @@ def test_a_circuit_fed_in_blocks_gives_what_it_gives_at_once(electronics):
         )
         part = respond(station, drive, state)
         state = part.final
-        parts.append(circuit.edges(part))
+        parts.append(circuit.edges(passed_slots(part, "cup")))
     together = np.concatenate(parts)
     # Where a rotor is unequal its results lie as close as the block's strongest gust asks for.
     assert together.size == at_once.size
@@ -458,7 +459,7 @@ def test_a_shaft_angle_tells_which_way_a_propeller_turns() -> None:
     t = np.arange(401) * 0.05
     wind = np.stack([6.0 * np.sin(2.0 * np.pi * t / 10.0), np.zeros(401), np.zeros(401)], axis=1)
     response = respond(Station(instruments=(propeller,)), Drive(START, 0.05, wind))
-    told = PulseCircuit("propeller", START, 0).signals(response)
+    told = PulseCircuit("propeller", START, 0).signals(passed_slots(response, "propeller"))
     assert told.turns is not None
     psi = np.interp(seconds(told.time), t, response.rotors["propeller"].psi_on_grid)
     np.testing.assert_allclose(2.0 * np.pi * told.turns, psi, atol=0.3)

@@ -7,16 +7,22 @@ the motion that was simulated.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.compiled import compiled
 from wind_sensors.motion import frames, rotations
 from wind_sensors.motion.platform_track import Motion, shifted
 from wind_sensors.station.model import HeadingDeviation, Platform
 
 FloatArray = npt.NDArray[np.float64]
+
+MOST_STEPS = 7
+CLOSE = 1e-7
+"""A step of Newton's method this small [rad] leaves an error of the order of its square."""
 
 
 def heading_error(deviation: HeadingDeviation, heading: npt.ArrayLike) -> FloatArray:
@@ -43,18 +49,34 @@ def heading_without_error(deviation: HeadingDeviation, reported: npt.ArrayLike) 
     Newton's method; the deviation's slope stays far below one for any compass worth the name.
     """
     target = np.asarray(reported, dtype=np.float64)
-    a = np.radians(deviation.constant_deg)
-    b, c = np.radians(deviation.sine_deg), np.radians(deviation.cosine_deg)
-    d, e = np.radians(deviation.sine_2_deg), np.radians(deviation.cosine_2_deg)
-    heading = target - heading_error(deviation, target)
-    for _ in range(6):
-        sine, cosine = np.sin(heading), np.cos(heading)
-        sine_2, cosine_2 = 2.0 * sine * cosine, cosine * cosine - sine * sine
-        excess = heading + (a + b * sine + c * cosine + d * sine_2 + e * cosine_2) - target
-        slope = b * cosine - c * sine + 2.0 * (d * cosine_2 - e * sine_2)
-        heading = heading - excess / (1.0 + slope)
-    result: FloatArray = heading
+    terms = np.radians(
+        (deviation.constant_deg, deviation.sine_deg, deviation.cosine_deg,
+         deviation.sine_2_deg, deviation.cosine_2_deg)
+    )  # fmt: skip
+    result: FloatArray = _undeviated(target.ravel(), *terms).reshape(target.shape)
     return result
+
+
+@compiled
+def _undeviated(
+    target: FloatArray, a: float, b: float, c: float, d: float, e: float
+) -> FloatArray:
+    """Headings h with h + a + b sin h + c cos h + d sin 2h + e cos 2h = target, shape (n,)."""
+    out = np.empty_like(target)
+    for i in range(target.size):
+        heading = target[i]
+        for step in range(MOST_STEPS):
+            sine, cosine = math.sin(heading), math.cos(heading)
+            sine_2, cosine_2 = 2.0 * sine * cosine, cosine * cosine - sine * sine
+            excess = heading - target[i] + a + b * sine + c * cosine + d * sine_2 + e * cosine_2
+            # As good a start as one of Newton's steps where the slope is large.
+            slope = b * cosine - c * sine + 2.0 * (d * cosine_2 - e * sine_2)
+            change = excess / (1.0 + slope) if step > 0 else excess
+            heading -= change
+            if abs(change) < CLOSE:
+                break
+        out[i] = heading
+    return out
 
 
 def _compass(attitude: FloatArray) -> FloatArray:

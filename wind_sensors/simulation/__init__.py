@@ -6,6 +6,7 @@ from wind_sensors.simulation.pulses import (
     PulseCircuit,
     edge_times,
     expected_signals,
+    passed_slots,
     rotor_signals,
 )
 from wind_sensors.simulation.response import (
@@ -37,6 +38,7 @@ __all__ = [
     "drive_from_recording",
     "edge_times",
     "expected_signals",
+    "passed_slots",
     "respond",
     "rotor_signals",
     "simulate",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -204,7 +205,7 @@ def _refuse_what_fills_the_memory(rotor: Rotor, psi: FloatArray) -> None:
 
 
 @dataclass(frozen=True)
-class _Passed:
+class PassedSlots:
     """Slots that passed the sensor while the rotor did not change.
 
     Attributes:
@@ -235,6 +236,27 @@ class _Passed:
         return lost_share(electronics, rate * self.rotor.calibration_distance)
 
 
+def passed_slots(response: Response, name: str) -> list[PassedSlots]:
+    """The slots of one rotor that passed its sensor, by the stretches of a response."""
+    movement = response.rotors[name]
+    drive = response.drive
+    out: list[PassedSlots] = []
+    for stretch in response.stretches:
+        rotor = stretch.segment.station.instrument(name)
+        assert isinstance(rotor, Rotor)
+        here = slice(stretch.first * movement.nodes, stretch.last * movement.nodes + 1)
+        _refuse_what_fills_the_memory(rotor, movement.psi[here])
+        times, numbers = _edges_of(
+            movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor),
+            drive.start_ns, stretch.first * drive.dt,
+        )  # fmt: skip
+        end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
+        begin = drive.start_ns + round(stretch.first * drive.dt * 1e9)
+        rate = movement.rate[here]
+        out.append(PassedSlots(rotor, times, numbers, end, rate, begin, movement.dt))
+    return out
+
+
 class PulseCircuit:
     """Sensor, contact and logger of one rotor; keeps its state between responses.
 
@@ -251,23 +273,21 @@ class PulseCircuit:
         self._last = LONG_AGO
         self._waiting: TimeArray = np.empty(0, dtype=np.int64)
 
-    def edges(self, response: Response) -> TimeArray:
-        """Stamps of the edges that the logger records in a response [ns], in order of time."""
-        parts = [self._recorded(passed) for passed in self._passed(response)]
+    def edges(self, slots: Sequence[PassedSlots]) -> TimeArray:
+        """Stamps of the edges that the logger records of slots [ns], in order of time."""
+        parts = [self._recorded(passed) for passed in slots]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
-    def signals(self, response: Response) -> Pulses:
+    def signals(self, slots: Sequence[PassedSlots]) -> Pulses:
         """What the logger records: edges, or the shaft's angle whenever it passes a slot.
 
         Only a shaft angle tells which way the rotor turns. Its source knows neither dead time nor
         bounces; messages can be lost.
         """
-        rotor = response.station.instrument(self._name)
-        assert isinstance(rotor, Rotor)
-        if resolved(rotor.pulses, "pulses").meaning != "angle":
-            return Pulses(self.edges(response))
+        if resolved(slots[0].rotor.pulses, "pulses").meaning != "angle":
+            return Pulses(self.edges(slots))
         time, turns = [], []
-        for passed in self._passed(response):
+        for passed in slots:
             now, times, numbers = passed.rotor, passed.times, passed.numbers
             kept = ~self._silent(now, times)
             if now.electronics.loss_probability > 0.0:
@@ -276,15 +296,15 @@ class PulseCircuit:
             turns.append(numbers[kept] / now.pulses_per_revolution)
         return Pulses(np.concatenate(time), np.concatenate(turns))
 
-    def expected(self, response: Response, bounces: bool = True) -> Pulses:
+    def expected(self, slots: Sequence[PassedSlots], bounces: bool = True) -> Pulses:
         """What the logger records on average: every edge, for as many as chance makes of it.
 
         Args:
-            response: What the rotor does.
+            slots: Those that passed.
             bounces: Whether edges that bounce count more than once.
         """
         time, weights = [], []
-        for passed in self._passed(response):
+        for passed in slots:
             rotor = passed.rotor
             electronics = rotor.electronics
             sure = {"bounce_probability": 0.0, "loss_probability": 0.0}
@@ -305,26 +325,6 @@ class PulseCircuit:
             )
         return Pulses(np.concatenate(time), np.cumsum(np.concatenate(weights)))
 
-    def _passed(self, response: Response) -> list[_Passed]:
-        """The slots that passed in each stretch."""
-        movement = response.rotors[self._name]
-        drive = response.drive
-        out: list[_Passed] = []
-        for stretch in response.stretches:
-            rotor = stretch.segment.station.instrument(self._name)
-            assert isinstance(rotor, Rotor)
-            here = slice(stretch.first * movement.nodes, stretch.last * movement.nodes + 1)
-            _refuse_what_fills_the_memory(rotor, movement.psi[here])
-            times, numbers = _edges_of(
-                movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor),
-                drive.start_ns, stretch.first * drive.dt,
-            )  # fmt: skip
-            end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
-            begin = drive.start_ns + round(stretch.first * drive.dt * 1e9)
-            rate = movement.rate[here]
-            out.append(_Passed(rotor, times, numbers, end, rate, begin, movement.dt))
-        return out
-
     def _silent(self, rotor: Rotor, times: TimeArray) -> npt.NDArray[np.bool_]:
         """Which times lie in an outage."""
         since = (times - self._origin) * 1e-9
@@ -336,7 +336,7 @@ class PulseCircuit:
     def _drawn(self, purpose: str, numbers: npt.NDArray[np.int64]) -> FloatArray:
         return random_numbers.uniform(self._seed, f"{self._name}/{purpose}", numbers)
 
-    def _recorded(self, passed: _Passed) -> TimeArray:
+    def _recorded(self, passed: PassedSlots) -> TimeArray:
         rotor, times, numbers, end = passed.rotor, passed.times, passed.numbers, passed.end
         electronics = rotor.electronics
         bounces: TimeArray = np.empty(0, dtype=np.int64)
@@ -371,17 +371,27 @@ def edge_times(response: Response, name: str, seed: int = 0) -> TimeArray:
     Returns:
         [ns], in order of the edges' true times.
     """
-    return PulseCircuit(name, _origin(response), seed).edges(response)
+    return PulseCircuit(name, _origin(response), seed).edges(passed_slots(response, name))
 
 
 def rotor_signals(response: Response, name: str, seed: int = 0) -> Pulses:
     """`PulseCircuit.signals` of one rotor in a response that begins a recording's interval."""
-    return PulseCircuit(name, _origin(response), seed).signals(response)
+    return PulseCircuit(name, _origin(response), seed).signals(passed_slots(response, name))
 
 
 def expected_signals(response: Response, name: str, bounces: bool = True) -> Pulses:
     """`PulseCircuit.expected` of one rotor in a response that begins a recording's interval."""
-    return PulseCircuit(name, _origin(response), 0).expected(response, bounces)
+    slots = passed_slots(response, name)
+    return PulseCircuit(name, _origin(response), 0).expected(slots, bounces)
+
+
+def signals_and_expected(
+    response: Response, name: str, bounces: bool = True
+) -> tuple[Pulses, Pulses]:
+    """`rotor_signals` and `expected_signals`, for hardly more than one of them takes."""
+    slots, origin = passed_slots(response, name), _origin(response)
+    drawn = PulseCircuit(name, origin, 0).signals(slots)
+    return drawn, PulseCircuit(name, origin, 0).expected(slots, bounces)
 
 
 def _origin(response: Response) -> int:

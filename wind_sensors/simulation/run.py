@@ -20,7 +20,7 @@ from wind_sensors.simulation.carrier import Carrier, reported_with_noise
 from wind_sensors.simulation.clocks import stamps
 from wind_sensors.simulation.drive import Drive, air_density
 from wind_sensors.simulation.encoder import AngleEncoder
-from wind_sensors.simulation.pulses import PulseCircuit
+from wind_sensors.simulation.pulses import PulseCircuit, passed_slots
 from wind_sensors.simulation.response import Response, ResponseState, respond
 from wind_sensors.simulation.scenario import Scenario
 from wind_sensors.simulation.trajectories import Trajectory
@@ -165,7 +165,9 @@ class SignalStream:
         return SignalBlock(
             start=drive.start_ns,
             stop=self._at(end),
-            pulses={n: c.signals(response) for n, c in self._circuits.items()},
+            pulses={
+                n: c.signals(passed_slots(response, n)) for n, c in self._circuits.items()
+            },
             angles={n: self._angles(n, response, begin, end) for n in self._encoders},
             reference=reference,
             platform=None if motion is None else self._platform(response, motion, begin, end),

@@ -24,7 +24,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.memory import DriveMemory, Memory
-from wind_sensors.simulation.pulses import expected_signals, rotor_signals
+from wind_sensors.simulation.pulses import rotor_signals, signals_and_expected
 from wind_sensors.simulation.response import Response, respond
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.changes import segments
@@ -167,14 +167,22 @@ class Comparison(View):
             if only and name not in only:
                 continue
             if c.kind == "rotor_rate":
-                turned = response.rotors[name].psi[-1]
-                if not np.isfinite(turned) or abs(turned) > FASTEST * self.drive.wind.shape[0]:
-                    raise ValueError(f"'{name}' runs away")
-                pulses[name] = rotor_signals(response, name)
+                pulses[name] = rotor_signals(self._at_speed(response, name), name)
             else:
                 time = self.recording.angles[name].time
                 angles[name] = Angles(time, angle_readings(response, name, time))
         return pulses, angles
+
+    def _at_speed(self, response: Response, rotor: str) -> Response:
+        """The response, if the rotor keeps to what rotors can.
+
+        Raises:
+            ValueError: It runs away.
+        """
+        turned = response.rotors[rotor].psi[-1]
+        if not np.isfinite(turned) or abs(turned) > FASTEST * self.drive.wind.shape[0]:
+            raise ValueError(f"'{rotor}' runs away")
+        return response
 
     def simulate(
         self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
@@ -208,15 +216,21 @@ class Comparison(View):
         parts = [station.instrument(name) for name in reaching]
         key = repr((instrument, parts, station.platform, station.sensor_heading_deg, changes))
         alone = station.model_copy(update={"changes": changes})
-        return self._simulated.of(
-            key,
-            lambda: self.observe(
-                *self.signals(alone, (instrument,)), self._expected_pulses(alone, instrument)
-            ),
-        )
+        if not self._by_chance(alone, instrument):
+            return self._simulated.of(
+                key, lambda: self.observe(*self.signals(alone, (instrument,)))
+            )
+        return self._simulated.of(key, lambda: self._drawn_and_expected(alone, instrument))
 
-    def _expected_pulses(self, station: Station, instrument: str) -> dict[str, Pulses]:
-        """What a rotor whose pulses are lost or bounce by chance records on average."""
+    def _drawn_and_expected(self, station: Station, rotor: str) -> Simulated:
+        """What is seen of a rotor of whose edges chance takes or doubles some."""
+        response = self._at_speed(self.respond(station, (rotor,)), rotor)
+        bounces = rotor not in self.debounced
+        drawn, expected = signals_and_expected(response, rotor, bounces)
+        return self.observe({rotor: drawn}, {}, {rotor: expected})
+
+    def _by_chance(self, station: Station, instrument: str) -> bool:
+        """Whether chance takes or doubles edges of an instrument."""
         rotors = [
             entry
             for part in segments(station)
@@ -224,11 +238,7 @@ class Comparison(View):
             and resolved(entry.pulses, "pulses").meaning != "angle"
         ]
         electronics = [rotor.electronics for rotor in rotors]
-        if not any(e.bounce_probability > 0.0 or e.loss_probability > 0.0 for e in electronics):
-            return {}
-        response = self.respond(station, (instrument,))
-        bounces = instrument not in self.debounced
-        return {instrument: expected_signals(response, instrument, bounces)}
+        return any(e.bounce_probability > 0.0 or e.loss_probability > 0.0 for e in electronics)
 
     def _reaching(self, station: Station, instrument: str) -> tuple[str, ...]:
         """Instruments on which the signals of one depend: itself and what carries it."""

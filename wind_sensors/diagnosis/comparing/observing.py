@@ -6,12 +6,14 @@ which `comparison` compares.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.compiled import compiled
 from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.observation import (
     LOWEST_BAND_FREQUENCY,
@@ -183,13 +185,11 @@ class View:
         """
         if on_average.turns is None:
             return 0.0
-        counted = np.diff(on_average.turns, prepend=0.0) * rotor.pulses_per_revolution
-        share = counted % 1.0
-        way = 2.0 * np.pi * rotor.calibration_distance / rotor.pulses_per_revolution
-        ones = self.masked(np.ones(self.grid.n))
+        slots = rotor.pulses_per_revolution
+        way = 2.0 * np.pi * rotor.calibration_distance / slots
         at = self.grid.seconds(on_average.time)
-        weight = np.interp(at, self.grid.centres, ones, left=0.0, right=0.0)
-        drawn = float(np.sum(weight**2 * share * (1.0 - share)))
+        weight = self.masked(np.ones(self.grid.n))
+        drawn = _drawn(at, on_average.turns, slots, weight, self.grid.dt)
         return drawn * way**2 / (self.grid.n * self.grid.dt**2)
 
     def _vane(self, channel: Channel, readings: Angles) -> Simulated:
@@ -280,3 +280,28 @@ class View:
             if high > 1.1 * low and np.count_nonzero(inside) >= 20:
                 out[k] = np.log(np.mean(power[inside]) + 1e-12)
         return out
+
+
+@compiled
+def _drawn(
+    time: FloatArray, turns: FloatArray, slots: int, weight: FloatArray, dt: float
+) -> float:
+    """Sum of the variances of how often each edge is counted, where bins count.
+
+    Args:
+        time: Of the edges [s], shape (n,).
+        turns: That there are with each, shape (n,); times `slots` grows by the share with which an
+            edge is counted, and by one more if it is counted for certain.
+        slots: Per turn.
+        weight: Of the bins, shape (bins,).
+        dt: Width of a bin [s].
+    """
+    total, before = 0.0, 0.0
+    for i in range(time.size):
+        counted = (turns[i] - before) * slots
+        before = turns[i]
+        bin_of = math.floor(time[i] / dt)
+        if 0 <= bin_of < weight.size:
+            share = counted - math.floor(counted)
+            total += weight[bin_of] ** 2 * share * (1.0 - share)
+    return total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import itemgetter
 
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explaining.acceptance import (
@@ -44,6 +45,7 @@ from wind_sensors.diagnosis.explaining.fitting import (
     without_term,
 )
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER, Searcher
+from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 MERGE_CANDIDATES = 8
@@ -68,8 +70,13 @@ def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         current: The explanation.
     """
     for _ in range(MOST_LOOKS):
-        costs = [(_cost(searcher, whitener, terms), terms) for terms in _around(current.terms)]
-        cost, terms = min(costs, key=lambda pair: pair[0], default=(current.cost, ()))
+        around = _around(current.terms)
+        costs = in_parallel(
+            lambda terms: _cost(searcher, whitener, terms), around, searcher.workers
+        )
+        cost, terms = min(
+            zip(costs, around, strict=True), key=itemgetter(0), default=(current.cost, ())
+        )
         if cost > current.cost - ROUGHLY:
             return current
         current = fit(whitener, searcher.station, terms, searcher.bank.without)
@@ -114,18 +121,15 @@ def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
 
 def _without_each(searcher: Searcher, whitener: Whitener, current: Fit) -> list[Fit]:
     """Fits without the first term, without the second, and so on."""
-    parts = [without_term(current, k) for k in range(len(current.terms))]
-    return [
-        fit(
-            whitener,
-            searcher.station,
-            part.terms,
-            searcher.bank.without,
-            known=part,
+
+    def without(k: int) -> Fit:
+        part = without_term(current, k)
+        return fit(
+            whitener, searcher.station, part.terms, searcher.bank.without, known=part,
             least=ROUGHLY,
-        )
-        for part in parts
-    ]
+        )  # fmt: skip
+
+    return in_parallel(without, range(len(current.terms)), searcher.workers)
 
 
 def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:

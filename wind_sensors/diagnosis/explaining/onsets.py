@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -207,9 +208,14 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
         )
         if total(trial) < total(best):
             best, always = trial, None
-    if best.terms[-1].effect.entrance == "clock":
+    if moves_a_clock(best):
         best = _at_the_jump(searcher, whitener, best, proposed - {ALWAYS})
     return best
+
+
+def moves_a_clock(candidate: Fit) -> bool:
+    """Whether a fit's last term is of a clock: its moments are sought one by one, for long."""
+    return candidate.terms[-1].effect.entrance == "clock"
 
 
 def in_a_part(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
@@ -276,11 +282,10 @@ def _at_the_jump(
             steps = round(reach / step)
             moves = step * np.arange(-steps, steps + 1)
             places = np.unique(np.round([e + moves for e in edges if e is not None], 3))
-            for place in places.tolist():
-                interval = (place, best[1]) if begins else (best[0], place)
-                reached = cost(interval)
-                if reached < lowest:
-                    best, lowest = interval, reached
+            tried = [(p, best[1]) if begins else (best[0], p) for p in places.tolist()]
+            costs = in_parallel(cost, tried, searcher.workers)
+            if min(costs, default=np.inf) < lowest:
+                best, lowest = tried[int(np.argmin(costs))], min(costs)
             edges = {best[0] if begins else best[1]} if edges else edges
     if best == last.interval:
         return candidate
@@ -338,38 +343,62 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
 
     Judged in the null in which the effects need not have the simulation's exact form, so that a
     wrong form does not pass for an interval.
+
+    Args:
+        searcher: The search.
+        current: The explanation.
     """
-    comparison = searcher.comparison
-    for term in current.terms:
-        if term.interval != ALWAYS or term.effect.legible:
-            continue
-        whitener = searcher.whitener(current.simulated, current)
-        known = seen_in(whitener, current)
-        others = [t for t in current.terms if t.key != term.key]
-        without = comparison.possible(planted(searcher.station, others))
-        if without is None:
-            continue
-        start = whitener.of(without)
-        cuts = _screening_cuts(searcher)
-        cells = cell_signatures(comparison, without, current.simulated, whitener.trust, cuts)
-        gains = interval_gains(cuts, [whitener.through_standing(cells)], start, joint=False)
-        span = _best_span(gains, SHORTEST_WINDOW)
-        before = float(start @ start)
-        # Not in the null, which lets the effect have another size.
-        gain = np.sum(whitener.noise_whitened(without) ** 2)
-        gain -= np.sum(whitener.noise_whitened(current.simulated) ** 2)
-        least = max(ONSET_GAIN, ONSET_SHARE * float(gain))
-        if span is None or known.cost - (before - span.net) < least:
-            continue
-        interval = interval_of(comparison, *span.window)
-        passing = replace(term, interval=interval)
-        if ruled_out(comparison, searcher.station, [*others, passing]):
-            continue
-        trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
-        trial = refined_interval(searcher, whitener, trial)
-        always = fit(
-            whitener, searcher.station, current.terms, searcher.bank.without, known=current
+    waiting = [term.key for term in current.terms]
+    while waiting:
+        terms = [next(t for t in current.terms if t.key == key) for key in waiting]
+        passing = in_parallel(
+            partial(_passing, searcher, current), terms, searcher.workers
         )
-        if total(trial) < total(always) - least and plausible(trial):
-            current = trial
+        # What one leaves may be the others' interval: they are asked again beside it.
+        first = next((k for k, found in enumerate(passing) if found is not None), None)
+        if first is None:
+            break
+        current = passing[first]
+        waiting = waiting[first + 1 :]
     return current
+
+
+def _passing(searcher: Searcher, current: Fit, term: Term) -> Fit | None:
+    """The explanation with one of its terms beginning or ending; None: it always holds.
+
+    Args:
+        searcher: The search.
+        current: The explanation.
+        term: One of its terms.
+    """
+    if term.interval != ALWAYS or term.effect.legible:
+        return None
+    comparison = searcher.comparison
+    whitener = searcher.whitener(current.simulated, current)
+    known = seen_in(whitener, current)
+    others = [t for t in current.terms if t.key != term.key]
+    without = comparison.possible(planted(searcher.station, others))
+    if without is None:
+        return None
+    start = whitener.of(without)
+    cuts = _screening_cuts(searcher)
+    cells = cell_signatures(comparison, without, current.simulated, whitener.trust, cuts)
+    gains = interval_gains(cuts, [whitener.through_standing(cells)], start, joint=False)
+    span = _best_span(gains, SHORTEST_WINDOW)
+    before = float(start @ start)
+    # Not in the null, which lets the effect have another size.
+    gain = np.sum(whitener.noise_whitened(without) ** 2)
+    gain -= np.sum(whitener.noise_whitened(current.simulated) ** 2)
+    least = max(ONSET_GAIN, ONSET_SHARE * float(gain))
+    if span is None or known.cost - (before - span.net) < least:
+        return None
+    interval = interval_of(comparison, *span.window)
+    passing = replace(term, interval=interval)
+    if ruled_out(comparison, searcher.station, [*others, passing]):
+        return None
+    trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
+    trial = refined_interval(searcher, whitener, trial)
+    always = fit(whitener, searcher.station, current.terms, searcher.bank.without, known=current)
+    if total(trial) < total(always) - least and plausible(trial):
+        return trial
+    return None

@@ -33,7 +33,12 @@ from wind_sensors.diagnosis.explaining.leading import (
     leader_of,
     not_told,
 )
-from wind_sensors.diagnosis.explaining.onsets import in_a_part, refined_interval, window_starts
+from wind_sensors.diagnosis.explaining.onsets import (
+    in_a_part,
+    moves_a_clock,
+    refined_interval,
+    window_starts,
+)
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -365,7 +370,11 @@ def _with_sharp_intervals(
         if r.fit.terms[-1].interval != ALWAYS and not r.fit.terms[-1].effect.legible
     ]
     lasting = [r for r in ranked if not any(r is p for p in passing)]
-    sharp = judged(searcher, in_parallel(sharper, passing, searcher.workers), named)
+    # Several processes look for the moments of a clock, and one each for those of the others.
+    clocks = [r for r in passing if moves_a_clock(r.fit)]
+    others_passing = [r for r in passing if not moves_a_clock(r.fit)]
+    moved = in_parallel(sharper, others_passing, searcher.workers)
+    sharp = judged(searcher, [*map(sharper, clocks), *moved], named)
     others = searcher.refit_all(null, _fuller(searcher, sharp))
     if sharp:
         others += searcher.fit_all(null, named, blind_starts(searcher, sharp))

@@ -162,13 +162,14 @@ def in_parallel(
     Args:
         function: Called with each item; its results are pickled.
         items: Arguments.
-        workers: Number of processes; 1 stays in this one.
+        workers: Number of processes; 1 stays in this one, as does what is called in one of them.
         progress: Called with the share done.
         work: About how long an item takes, in any unit. The longest begin first, so that no
             process is left waiting for one that began last.
     """
     out: list[Any] = []
-    if workers < 2 or len(items) < 2 or "fork" not in multiprocessing.get_all_start_methods():
+    alone = workers < 2 or len(items) < 2 or multiprocessing.current_process().daemon
+    if alone or "fork" not in multiprocessing.get_all_start_methods():
         results: Iterable[Any] = map(function, items)
         for result in results:
             out.append(result)
