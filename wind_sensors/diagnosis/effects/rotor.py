@@ -220,7 +220,8 @@ DAMAGED_CUP = Effect(
     loose_statistics=frozenset({"beat of the pulses with the wind, twice per turn"}),
     parameters=(
         Parameter("torque_harmonic", "1", 0.0, 1.5, minimum=0.01, step=0.005, starts=(0.05,)),
-        Parameter("gain", "1", 0.4, 1.5, healthy=1.0, minimum=0.0, step=0.02, starts=(0.97,)),
+        # What pulls less makes no rotor faster.
+        Parameter("gain", "1", 0.4, 1.0, healthy=1.0, minimum=0.0, step=0.02, starts=(0.97,)),
     ),
     applies=_is_rotor,
     update=_damage,

@@ -219,7 +219,7 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
     if not acts_beside(searcher, further, current.terms) or further.is_told:
         return 0.0
     small = further.relative_size < SMALLEST_BESIDE
-    if small and not _brings_most(searcher, whitener, current, longer):
+    if small and may_be_form(searcher, whitener, current, longer):
         return np.inf
     if is_its_moment(searcher, current, further):
         return np.inf
@@ -227,10 +227,21 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
     return max(own, LEAST_BESIDE_GAIN) if own > 0.0 else 0.0
 
 
-def _brings_most(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> bool:
-    """Whether a further term brings more than all before it: then it mends the form of none."""
-    nothing = whitener.of(searcher.bank.without)
-    return current.cost - longer.cost > float(nothing @ nothing) - current.cost
+def may_be_form(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> bool:
+    """Whether what further terms bring may be the form of those before.
+
+    Not if they bring more than these do in the kinds of comparison in which the further ones act:
+    what moves a rotor's mean is not the form of what a damaged cup does within its turns.
+
+    Args:
+        searcher: The search.
+        whitener: A null.
+        fewer: An explanation.
+        more: One with further effects.
+    """
+    before, after = whitener.of(fewer.simulated), whitener.of(more.simulated)
+    brings = float(before @ before - after @ after)
+    return brings <= gained_alike(searcher, whitener, fewer, more)
 
 
 def acts_beside(searcher: Searcher, further: Term, terms: Sequence[Term]) -> bool:

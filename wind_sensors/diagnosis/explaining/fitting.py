@@ -44,6 +44,10 @@ side of a bin's border or the other make the cost rough."""
 _NEARLY_LINEAR = 0.9
 """Derivatives are carried along after a step that gained this share of what they promised."""
 
+_OVER_THE_ROUGH = 4.0
+"""Where no step keeps what the derivatives promise, they are taken over so many times as far: a
+vane that turns round the other way leaves hollows in the cost."""
+
 _SLOW = 0.3
 """Steps with derivatives that hold gain no more than this share of what the step before gained."""
 
@@ -354,17 +358,19 @@ def fit(
             values, problem.compared(simulated), low, high, carried=known.slopes
         )
     normal = np.eye(len(values))
-    exact = stale = False
+    exact = stale = rough = False
     before = np.inf
     for _ in range(iterations):
         if slopes is None or stale:
-            slopes = problem.slopes(values, problem.compared(simulated), low, high)
+            steps = _OVER_THE_ROUGH * scale if rough else None
+            slopes = problem.slopes(values, problem.compared(simulated), low, high, steps=steps)
             exact, stale, before = True, False, np.inf
         jacobian = problem.whitened(slopes)
         normal = jacobian.T @ jacobian
         gradient = jacobian.T @ vector
         worthwhile = least + _ROUNDING * cost + _FAR_OFF * max(cost - vector.size, 0.0)
         gained = promised = 0.0
+        misled = False
         while damping < _LARGEST_DAMPING:
             weighted = normal + damping * np.diag(np.diag(normal) + 1e-9)
             step = -np.linalg.solve(weighted, gradient) * scale
@@ -391,7 +397,12 @@ def fit(
                 stale = True
                 break
             damping *= 8.0
-        if gained < worthwhile and (exact or promised < worthwhile):
+            misled = True
+        if misled and gained == 0.0 and not rough:
+            # Small steps promise to go down and all go up: the slope is that of a hollow.
+            rough = stale = True
+            damping = 1e-2
+        elif gained < worthwhile and (exact or promised < worthwhile):
             break
         exact = False
     seen = np.diag(normal) > _LEAST_INFORMATION

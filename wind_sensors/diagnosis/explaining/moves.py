@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     inexactness,
     is_plausible,
     large_enough,
+    may_be_form,
     may_join,
     needed_gain,
     only_makes_good,
@@ -196,7 +197,13 @@ def _only_mends(
     fewer = _without_each(searcher, whitener, current)
     missed = {term.key: total(f) for term, f in zip(current.terms, fewer, strict=True)}
     most = max(cost for key, cost in missed.items() if key not in small)
-    return frozenset(key for key in small if missed[key] < most)
+    return frozenset(
+        term.key
+        for term, f in zip(current.terms, fewer, strict=True)
+        if term.key in small
+        and missed[term.key] < most
+        and may_be_form(searcher, whitener, f, current)
+    )
 
 
 def _simpler(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION, Effect
 from wind_sensors.diagnosis.explaining.acceptance import (
     calms_too_much,
     is_a_stall,
@@ -45,6 +45,10 @@ from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FIRST_CANDIDATES = 9
 LATER_CANDIDATES = 6
+
+LATER_WIDE = 2
+"""So many of the effects that turn or carry the whole wind are tried from the best moment on."""
+
 LARGE_CANDIDATES = 5
 """So many of the best single effects are tried beside another in the size that they have alone."""
 
@@ -377,7 +381,8 @@ def _with_sharp_intervals(
     sharp = judged(searcher, [*map(sharper, clocks), *moved], named)
     others = searcher.refit_all(null, _fuller(searcher, sharp))
     if sharp:
-        others += searcher.fit_all(null, named, blind_starts(searcher, sharp))
+        starts = [*blind_starts(searcher, sharp), *later_starts(sharp, lasting)]
+        others += searcher.fit_all(null, named, starts)
     sound = judged(searcher, [f for f in others if plausible(f)], named)
     if sound and sound[0].evidence < sharp[0].evidence:
         # The interval is that of another effect so far.
@@ -423,6 +428,37 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         and reached & set(searcher.comparison.affected(searcher.station, key[1]))
         and may_join(of_one[0], others)
     ]
+
+
+def later_starts(passing: Sequence[Judged], lasting: Sequence[Judged]) -> list[list[Term]]:
+    """Starting points of what turns or carries the whole wind, from the best of the moments on.
+
+    Its signals do not grow with its size, so that the screening of intervals, which knows a small
+    one, sees it badly. As it always holds it explains something all the same.
+
+    Args:
+        passing: Explanations whose last effect begins or ends inside the record, best first.
+        lasting: Those whose last effect always holds.
+    """
+    begin, end = passing[0].fit.terms[-1].interval
+    if begin <= 0.0 or any(one.evidence < passing[0].evidence for one in lasting):
+        return []
+    known = {(one.fit.terms[-1].key, one.fit.terms[-1].interval) for one in passing}
+    wide = [
+        one.fit.terms[-1]
+        for one in sorted(lasting, key=lambda one: one.evidence)
+        if one.fit.terms[-1].instrument in (STATION, PLATFORM)
+        and not one.fit.terms[-1].effect.legible
+    ]
+    starts = [
+        [
+            replace(term, interval=interval)
+            for interval in dict.fromkeys(((begin, None), (begin, end)))
+            if (term.key, interval) not in known
+        ]
+        for term in wide[:LATER_WIDE]
+    ]
+    return [of_one for of_one in starts if of_one]
 
 
 def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
