@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import STATION, baseline, recorded
+from diagnosis_cases import STATION, baseline, diagnosed, recorded
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.acceptance import owed
+from wind_sensors.diagnosis.explaining.acceptance import inexactness, may_be_form, owed
 from wind_sensors.diagnosis.explaining.fitting import Term, fit, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.moves import simplified, swapped
@@ -114,6 +114,35 @@ def test_a_small_effect_that_brings_most_mends_nothing(drift: float, left: bool)
     both = fit(null_of(searcher, terms), STATION, terms, searcher.bank.without, iterations=0)
     names = {t.effect.name for t in simplified(searcher, null_of(searcher, terms), both).terms}
     assert names == ({"rotor_inertia", "calibration_drift"} if left else {"calibration_drift"})
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "form"),
+    [
+        ("damaged_cup", {"torque_harmonic": 0.2, "gain": 1.0}, False),
+        ("calibration_drift", {"gain": 0.9}, True),
+    ],
+)
+def test_a_small_effect_is_the_form_of_none_that_acts_in_another_way(
+    effect: str, values: dict[str, float], form: bool
+) -> None:
+    """An offset of one and a half of its smallest sizes: what a cup does within its turns moves no
+    mean."""
+    effects = catalogue()
+    first = Term(effects[effect], "cup", values)
+    small = Term(effects["calibration_offset"], "cup", {"offset": 0.15})
+    assert small.relative_size < first.relative_size
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, [first, small]), 75, swing=0.8)), baseline(), effects, {}
+    )
+    null = null_of(searcher, [first])
+    alone, both = (
+        fit(null, STATION, terms, searcher.bank.without, iterations=0)
+        for terms in ([first], [first, small])
+    )
+    assert alone.cost - both.cost < fit(null, STATION, []).cost - alone.cost
+    assert may_be_form(searcher, null, alone, both) is form
+    assert np.isinf(inexactness(searcher, null, alone, both)) == form
 
 
 def test_of_a_healthy_rotor_no_ice_is_left() -> None:
@@ -248,3 +277,10 @@ def test_bounces_tell_their_delay() -> None:
     (guess,) = (t for t in guesses_of(comparison, STATION)[("extra_pulses", "cup")])
     assert guess.held == {"bounce_delay"}
     assert guess.values["bounce_delay"] == pytest.approx(0.0017, rel=0.06)
+
+
+def test_a_rotor_that_turns_too_fast_is_not_called_damaged() -> None:
+    found = diagnosed("calibration_drift", "cup", gain=1.04)
+    rivals = {f.term.effect.name for f in found.findings}
+    assert "calibration_drift" in rivals
+    assert "damaged_cup" not in rivals

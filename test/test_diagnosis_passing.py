@@ -21,10 +21,10 @@ from wind_sensors.diagnosis.explaining.explanation import (
     judged,
     no_terms,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
 from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
-from wind_sensors.diagnosis.explaining.onsets import in_a_part
-from wind_sensors.diagnosis.explaining.rounds import blind_starts
+from wind_sensors.diagnosis.explaining.onsets import in_a_part, refined_interval
+from wind_sensors.diagnosis.explaining.rounds import blind_starts, later_starts
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Series
@@ -209,3 +209,42 @@ def test_stamps_that_are_late_from_some_moment_on_jump_there(
     stop = finding.term.interval[1]
     assert (stop is None) is (end is None)
     assert stop is None or stop == pytest.approx(end, abs=0.1)
+
+
+def test_a_vane_that_counts_backwards_for_a_while_is_sought_moment_by_moment() -> None:
+    """From a swing to the next a vane that counts backwards turns round elsewhere."""
+    swap = Term(catalogue()["sensor_swap"], "vane", {"reversed": 1.0}, (100.0, 290.0))
+    station = with_effect(STATION, swap.effect, "vane", swap.values, swap.interval)
+    searcher = searcher_of(
+        prepare(recorded(station, 74, swing=1.6)), baseline(), catalogue(), {}
+    )
+    null = searcher.whitener(searcher.bank.without)
+    part = replace(swap, interval=(180.0, 240.0))
+    found = refined_interval(searcher, null, fit(null, STATION, [part], searcher.bank.without))
+    start, stop = found.terms[0].interval
+    assert start == pytest.approx(100.0, abs=3.0)
+    assert stop == pytest.approx(290.0, abs=3.0)
+
+
+def test_what_turns_the_whole_wind_is_tried_from_the_best_moment_on(searcher: Searcher) -> None:
+    null = searcher.whitener(searcher.bank.without)
+    nothing = no_terms(null, searcher)
+    lean = Term(catalogue()["axis_tilt"], "station", {"tilt_x": 20.0, "tilt_y": 0.0})
+
+    def seen(term: Term, evidence: float) -> Judged:
+        return Judged(replace(nothing, terms=(term,)), null, evidence)
+
+    def tried(
+        interval: Interval, ahead: float, *lasting: Judged
+    ) -> list[tuple[tuple[str, str], Interval]]:
+        passing = seen(replace(drift(), interval=interval), -ahead)
+        return [(t.key, t.interval) for of in later_starts([passing], lasting) for t in of]
+
+    everywhere = [seen(lean, 0.0), seen(drift(), 0.0)]
+    assert tried((100.0, None), 1.0, *everywhere) == [(lean.key, (100.0, None))]
+    assert tried((100.0, 200.0), 1.0, *everywhere) == [
+        (lean.key, (100.0, None)), (lean.key, (100.0, 200.0)),
+    ]  # fmt: skip
+    # Not where something that always holds is ahead, or nothing begins.
+    assert tried((100.0, 200.0), -1.0, *everywhere) == []
+    assert tried((0.0, 200.0), 1.0, *everywhere) == []

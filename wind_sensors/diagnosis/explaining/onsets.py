@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.explaining.intervals import (
     cell_signatures,
     interval_gains,
     interval_of,
+    window_of,
 )
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
@@ -181,6 +182,8 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
     """
     comparison = searcher.comparison
     fixed = candidate.terms[:-1]
+    if not any(parameter.graded for parameter in candidate.terms[-1].effect.parameters):
+        return _by_trial(searcher, whitener, candidate)
     without = comparison.possible(planted(searcher.station, fixed))
     if without is None:
         return candidate
@@ -247,6 +250,47 @@ def in_a_part(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
     passing = replace(last, interval=interval_of(comparison, *windows[int(np.argmin(costs))]))
     trial = fit(whitener, searcher.station, [*fixed, passing], searcher.bank.without)
     return refined_interval(searcher, whitener, trial)
+
+
+def _by_trial(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
+    """The fit with its last term, which comes in no sizes, where it costs least, each place tried.
+
+    A vane that counts the other way turns round elsewhere, so that what it does in two parts of the
+    record is not the sum of what it does in each.
+
+    Args:
+        searcher: The search.
+        whitener: The null.
+        candidate: The fit.
+    """
+    comparison = searcher.comparison
+    *fixed, last = candidate.terms
+    length = comparison.grid.n * comparison.grid.dt
+
+    def cost(window: tuple[float, float]) -> float:
+        moved = replace(last, interval=interval_of(comparison, *window))
+        simulated = comparison.possible(planted(searcher.station, [*fixed, moved]))
+        if simulated is None or window[1] - window[0] < SHORTEST_WINDOW:
+            return np.inf
+        vector = whitener.of(simulated)
+        edges = (window[0] > 0.0) + (window[1] < length)
+        return float(vector @ vector) + PENALTY_PER_INTERVAL * edges
+
+    begin, end = window_of(comparison, last.interval)
+    for step in (WINDOW_STEP, WINDOW_STEP, *REFINING_STEPS):
+        for begins in (True, False):
+            edge = begin if begins else end
+            if step == WINDOW_STEP:
+                places = _screening_cuts(searcher)
+            else:
+                places = np.append(_around(edge, step, 0.0, length), edge)
+            tried = [(place, end) if begins else (begin, place) for place in places.tolist()]
+            begin, end = tried[int(np.argmin(in_parallel(cost, tried, searcher.workers)))]
+    moved = replace(last, interval=interval_of(comparison, begin, end))
+    trial = fit(
+        whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2
+    )
+    return trial if total(trial) < total(candidate) else candidate
 
 
 def _at_the_jump(
