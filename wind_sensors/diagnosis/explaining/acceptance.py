@@ -219,7 +219,8 @@ def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fi
     if not acts_beside(searcher, further, current.terms) or further.is_told:
         return 0.0
     small = further.relative_size < SMALLEST_BESIDE
-    if small and may_be_form(searcher, whitener, current, longer):
+    if small and may_be_form(searcher, searcher.whitener(longer.simulated), current, longer):
+        # Judged as at the end, where the forms of the others are not taken for granted.
         return np.inf
     if is_its_moment(searcher, current, further):
         return np.inf
