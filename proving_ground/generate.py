@@ -88,14 +88,15 @@ def generate_recording(spec: RecordingSpec) -> list[dict[str, Any]]:
 
 def record(scene: Scene, planted: Sequence[Planted], folder: Path) -> list[dict[str, Any]]:
     """Conceal causes in a scene, run it and write what was recorded into an existing folder."""
-    answers = [_plant(scene, each) for each in planted]
+    answers = [plant(scene, each) for each in planted]
     signals = run_scene(scene)
     write_bag(folder / "bag", signals, scene.station.rotor_name)
     write_sheet(folder / "recording.yaml", scene.station)
     return [_plain(entry) for entry in answers]
 
 
-def _plant(scene: Scene, planted: Planted) -> dict[str, Any]:
+def plant(scene: Scene, planted: Planted) -> dict[str, Any]:
+    """Conceal a cause in a scene that has not run yet; its answer."""
     found = cause(planted.effect)
     known = planted.effect in CATALOGUED
     smallest = MINIMUM_SIZES[planted.effect].value if known else 1.0

@@ -430,6 +430,21 @@ def _covariance(normal: FloatArray, parameters: Sequence[Parameter]) -> FloatArr
     return covariance
 
 
+def cost_of(whitener: Whitener, station: Station, terms: Sequence[Term]) -> float:
+    """Cost of terms as they are; infinite where the station is impossible.
+
+    Args:
+        whitener: The null.
+        station: The station as commissioned.
+        terms: Effects with their values.
+    """
+    simulated = whitener.comparison.possible(planted(station, terms))
+    if simulated is None:
+        return np.inf
+    vector = whitener.of(simulated)
+    return float(vector @ vector)
+
+
 def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> FloatArray:
     """Covariance of the parameters of a fit in a null, from differences that matter.
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from operator import itemgetter
 
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
@@ -41,8 +41,8 @@ from wind_sensors.diagnosis.explaining.fitting import (
     ROUGHLY,
     Fit,
     Term,
+    cost_of,
     fit,
-    planted,
     without_term,
 )
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER, Searcher
@@ -73,7 +73,7 @@ def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     for _ in range(MOST_LOOKS):
         around = _around(current.terms)
         costs = in_parallel(
-            lambda terms: _cost(searcher, whitener, terms), around, searcher.workers
+            partial(cost_of, whitener, searcher.station), around, searcher.workers
         )
         cost, terms = min(
             zip(costs, around, strict=True), key=itemgetter(0), default=(current.cost, ())
@@ -98,14 +98,6 @@ def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
                     other = replace(term, values={**term.values, parameter.name: moved})
                     found.append((*terms[:k], other, *terms[k + 1 :]))
     return found
-
-
-def _cost(searcher: Searcher, whitener: Whitener, terms: Sequence[Term]) -> float:
-    simulated = whitener.comparison.possible(planted(searcher.station, terms))
-    if simulated is None:
-        return math.inf
-    vector = whitener.of(simulated)
-    return float(vector @ vector)
 
 
 def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:

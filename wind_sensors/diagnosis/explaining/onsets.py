@@ -11,7 +11,15 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.acceptance import plausible
 from wind_sensors.diagnosis.explaining.explanation import seen_in, total
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import (
+    ALWAYS,
+    Fit,
+    Interval,
+    Term,
+    cost_of,
+    fit,
+    planted,
+)
 from wind_sensors.diagnosis.explaining.intervals import (
     NEAR_AN_END,
     IntervalGains,
@@ -239,12 +247,8 @@ def in_a_part(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
     windows = [(0.0, cut) for cut in cuts] + [(cut, length) for cut in cuts]
 
     def cost(window: tuple[float, float]) -> float:
-        passing = replace(last, interval=interval_of(comparison, *window))
-        simulated = comparison.possible(planted(searcher.station, [*fixed, passing]))
-        if simulated is None:
-            return np.inf
-        vector = whitener.of(simulated)
-        return float(vector @ vector)
+        held = replace(last, interval=interval_of(comparison, *window))
+        return cost_of(whitener, searcher.station, [*fixed, held])
 
     costs = in_parallel(cost, windows, searcher.workers)
     passing = replace(last, interval=interval_of(comparison, *windows[int(np.argmin(costs))]))
@@ -268,13 +272,12 @@ def _by_trial(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
     length = comparison.grid.n * comparison.grid.dt
 
     def cost(window: tuple[float, float]) -> float:
-        moved = replace(last, interval=interval_of(comparison, *window))
-        simulated = comparison.possible(planted(searcher.station, [*fixed, moved]))
-        if simulated is None or window[1] - window[0] < SHORTEST_WINDOW:
+        if window[1] - window[0] < SHORTEST_WINDOW:
             return np.inf
-        vector = whitener.of(simulated)
         edges = (window[0] > 0.0) + (window[1] < length)
-        return float(vector @ vector) + PENALTY_PER_INTERVAL * edges
+        held = replace(last, interval=interval_of(comparison, *window))
+        reached = cost_of(whitener, searcher.station, [*fixed, held])
+        return reached + PENALTY_PER_INTERVAL * edges
 
     begin, end = window_of(comparison, last.interval)
     for step in (WINDOW_STEP, WINDOW_STEP, *REFINING_STEPS):
@@ -313,12 +316,8 @@ def _at_the_jump(
     dt = comparison.grid.dt
 
     def cost(interval: Interval) -> float:
-        moved = [*fixed, replace(last, interval=interval)]
-        simulated = comparison.possible(planted(searcher.station, moved))
-        if simulated is None:
-            return np.inf
-        vector = whitener.of(simulated)
-        return float(vector @ vector)
+        held = replace(last, interval=interval)
+        return cost_of(whitener, searcher.station, [*fixed, held])
 
     for begins in (True, False):
         edges = {i[0] if begins else i[1] for i in proposed} - {0.0, None}
