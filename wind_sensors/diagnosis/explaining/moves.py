@@ -42,6 +42,7 @@ from wind_sensors.diagnosis.explaining.fitting import (
     Fit,
     Term,
     cost_of,
+    covariance_of,
     fit,
     without_term,
 )
@@ -163,7 +164,11 @@ def spared(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         whitener: The null.
         current: The explanation.
     """
-    terms = without_spare(current, PENALTY_PER_FURTHER_PARAMETER)
+    if not any(p.spare for term in current.terms for p in term.effect.parameters):
+        return current
+    # What small differences change is in part chance, and would pass for knowledge.
+    sure = replace(current, covariance=covariance_of(whitener, searcher.station, current))
+    terms = without_spare(sure, PENALTY_PER_FURTHER_PARAMETER)
     if terms == current.terms:
         return current
     fewer = fit(whitener, searcher.station, terms, searcher.bank.without)
