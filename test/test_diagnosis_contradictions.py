@@ -208,6 +208,23 @@ def test_few_gusts_make_the_lively_moments_of_a_part_of_the_record(
     assert is_uneven(naming, STATION) is uneven
 
 
+@pytest.mark.parametrize(
+    ("held", "uneven"),
+    [(("dead_time",), False), (("loss_probability",), True), ((), True)],
+)
+def test_a_size_that_the_pulses_say_is_one_whatever_a_fit_would_make_of_it(
+    monkeypatch: pytest.MonkeyPatch, held: tuple[str, ...], uneven: bool
+) -> None:
+    """Where pulses come nearly as fast as the counter follows, a gust loses every second one."""
+    dead = {"dead_time": 0.0075, "loss_probability": 0.0, "loss_growth": 0.0}
+    searcher, null = searched("missed_pulses", "cup", dead)
+    blind = Term(catalogue()["missed_pulses"], "cup", dead, held=frozenset(held))
+    fitted = fit(null, STATION, [blind], searcher.bank.without, iterations=0)
+    naming = Naming(fitted, null, null, null.of(searcher.bank.without), 100.0)
+    monkeypatch.setattr(contradictions, "unevenness", lambda *_: 50.0)
+    assert is_uneven(naming, STATION) is uneven
+
+
 def test_a_fit_leaves_a_hollow_that_small_steps_stay_in() -> None:
     searcher, null = searched("calibration_drift", "cup", {"gain": 0.9})
     short = Term(catalogue()["calibration_drift"], "cup", {"gain": 0.93})

@@ -383,10 +383,12 @@ def _ranks(series: FloatArray) -> FloatArray:
 def is_uneven(naming: Naming, station: Station) -> bool:
     """Whether an effect has another size while its signals are lively than while they are quiet.
 
-    Those whose form is certain are held to one size in all parts of the record instead.
+    Those whose form is certain are held to one size in all parts of the record instead. Of a size
+    that is read from the raw signals a fit says nothing.
     """
     for term in naming.fit.terms:
-        if term.effect.exact or term.effect.legible or term.is_told:
+        told = term.is_told or term.size_is_read
+        if term.effect.exact or term.effect.legible or told:
             continue
         most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
         if term.interval != ALWAYS:
