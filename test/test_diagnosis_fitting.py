@@ -13,15 +13,15 @@ from diagnosis_cases import STATION
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.fitting import Term, fit
 from wind_sensors.diagnosis.healthy.whitening import Whitener
-from wind_sensors.station.model import Station, Vane
+from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
-OFFSET = catalogue()["vane_offset"]
+TILT = catalogue()["axis_tilt"]
 TRUE = 30.0
 
 
 class Valley:
-    """A comparison with one datum, how far a vane's offset is from the truth, and a rough one.
+    """A comparison with one datum, how far a lean is from the truth, and a rough one.
 
     Args:
         ripple: Height of what is rough: over a step of the derivative it does what chance does.
@@ -34,9 +34,7 @@ class Valley:
         self.drive = SimpleNamespace(temperature=None, dt=1.0, elapsed=0.0)
 
     def possible(self, station: Station, *_: Any) -> Any:
-        vane = station.instruments[1]
-        assert isinstance(vane, Vane)
-        x = vane.offset_deg
+        x = station.instruments[1].tilt_deg[0]
         wave = np.sin(1e3 * x)
         data = np.array([0.5 * (x - TRUE), self.ripple * wave])
         return SimpleNamespace(flat=lambda channels: data)
@@ -49,11 +47,11 @@ class Valley:
 
 
 @pytest.mark.parametrize(
-    ("ripple", "start", "within"), [(0.0, 6.0, 0.3), (4.0, 6.0, 5.0), (4.0, 15.09, 5.0)]
+    ("ripple", "start", "within"), [(0.0, 6.0, 0.3), (4.0, 9.0, 14.0), (4.0, 12.0, 8.0)]
 )
 def test_hollows_in_the_cost_are_stepped_over(
     ripple: float, start: float, within: float
 ) -> None:
-    begun = Term(OFFSET, "vane", {"offset": start})
+    begun = Term(TILT, "station", {"tilt_x": start, "tilt_y": 0.0}, held=frozenset({"tilt_y"}))
     found = fit(cast(Whitener, Valley(ripple)), STATION, [begun])
-    assert found.terms[0].values["offset"] == pytest.approx(TRUE, abs=within)
+    assert found.terms[0].values["tilt_x"] == pytest.approx(TRUE, abs=within)

@@ -11,7 +11,13 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
+from wind_sensors.diagnosis.effects.definition import (
+    PLATFORM,
+    STATION,
+    Effect,
+    Parameter,
+    with_effect,
+)
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Station
@@ -45,8 +51,9 @@ _NEARLY_LINEAR = 0.9
 """Derivatives are carried along after a step that gained this share of what they promised."""
 
 _OVER_THE_ROUGH = 4.0
-"""Where no step keeps what the derivatives promise, they are taken over so many times as far: a
-vane that turns round the other way leaves hollows in the cost."""
+"""Where no step keeps what the derivatives promise, they are taken over so many times as far, of
+what turns or carries the whole wind: a vane that turns round the other way leaves hollows in its
+cost."""
 
 _SLOW = 0.3
 """Steps with derivatives that hold gain no more than this share of what the step before gained."""
@@ -367,6 +374,7 @@ def fit(
         )
     normal = np.eye(len(values))
     exact = stale = rough = False
+    hollows = any(term.instrument in (STATION, PLATFORM) for term in terms)
     before = np.inf
     for _ in range(iterations):
         if slopes is None or stale:
@@ -406,7 +414,7 @@ def fit(
                 break
             damping *= 8.0
             misled = True
-        if misled and gained == 0.0 and not rough:
+        if misled and gained == 0.0 and hollows and not rough:
             # Small steps promise to go down and all go up: the slope is that of a hollow.
             rough = stale = True
             damping = 1e-2
