@@ -25,7 +25,7 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from wind_sensors.diagnosis.explaining.fitting import planted
+from wind_sensors.diagnosis.explaining.terms import planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.verdict import diagnose

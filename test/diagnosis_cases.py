@@ -10,8 +10,9 @@ from scipy.signal import lfilter
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming, no_terms
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose

@@ -13,8 +13,8 @@ from wind_sensors.diagnosis.comparing import activity
 from wind_sensors.diagnosis.comparing.observation import Channel, Grid
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 
 CUP = Channel("cup/rotor_rate", "cup", "rotor_rate", length=2.0)
 GRID = Grid(start=0, dt=0.2, n=4510)

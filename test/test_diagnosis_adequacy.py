@@ -21,8 +21,9 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     passing_gain,
 )
 from wind_sensors.diagnosis.explaining.explanation import judged, no_terms
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import form_signatures, trust_of, unstanding
 from wind_sensors.diagnosis.proving.contradictions import is_uneven
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding

@@ -12,7 +12,7 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, channels_of
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.baseline import CALIBRATED_FROM, Baseline, default_channel
 from wind_sensors.diagnosis.healthy.calibrated_range import (
     is_calm,

@@ -13,11 +13,12 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, evidence, no_terms
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.leading import held_throughout
 from wind_sensors.diagnosis.explaining.moves import looked_around
 from wind_sensors.diagnosis.explaining.rounds import best_beside
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving import contradictions

@@ -11,7 +11,8 @@ import pytest
 from diagnosis_cases import STATION
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import Term, fit
+from wind_sensors.diagnosis.explaining.fitting import fit
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.station.model import Station
 

@@ -11,8 +11,9 @@ from diagnosis_cases import STATION, baseline, recorded
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.fitting import Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Change, Station
 

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted, simulated_with
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.intervals import cell_signatures, interval_gains
 from wind_sensors.diagnosis.explaining.onsets import refined_interval
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted, simulated_with
 
 CELLS = 7
 LENGTH = 40

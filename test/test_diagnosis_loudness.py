@@ -12,9 +12,10 @@ from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.acceptance import needed_gain
-from wind_sensors.diagnosis.explaining.fitting import Fit, Term
+from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.explaining.signatures import Template, templates_of
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.diagnosis.healthy.reference_lag import lag_weights

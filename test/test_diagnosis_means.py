@@ -14,7 +14,7 @@ import pytest
 from representatives import represented
 
 from wind_sensors.diagnosis.counts import compare_pair, count_statistics
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS
+from wind_sensors.diagnosis.explaining.terms import ALWAYS
 from wind_sensors.diagnosis.means.averages import averages_of, indicated_speed, joined
 from wind_sensors.diagnosis.means.diagnose import diagnose_means
 from wind_sensors.diagnosis.means.healthy import learn_means

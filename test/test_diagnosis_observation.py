@@ -22,7 +22,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
 )
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Angles, Pulses, erratic

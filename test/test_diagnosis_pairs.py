@@ -15,12 +15,13 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.acceptance import inexactness, may_be_form, owed
-from wind_sensors.diagnosis.explaining.fitting import Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.moves import simplified, swapped
 from wind_sensors.diagnosis.explaining.pairs import built_on_simple, promise, promising_pairs
 from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.verdict import diagnose
 

@@ -21,11 +21,12 @@ from wind_sensors.diagnosis.explaining.explanation import (
     judged,
     no_terms,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Interval, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
 from wind_sensors.diagnosis.explaining.onsets import in_a_part, refined_interval
 from wind_sensors.diagnosis.explaining.rounds import blind_starts, later_starts
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Series
 

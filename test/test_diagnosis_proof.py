@@ -11,7 +11,7 @@ from diagnosis_cases import STATION, baseline, recorded
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.whitening import trust_of, whitener_of
 from wind_sensors.diagnosis.proving.held_out import (
     BLOCKS,

@@ -28,10 +28,11 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.acceptance import inexactness, only_makes_good, overlap
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import hole_between
 from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose

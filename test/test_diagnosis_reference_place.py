@@ -18,8 +18,8 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.fitting import Term
 from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
 from wind_sensors.diagnosis.healthy.reference_lag import is_a_way_of_the_wind, misplaced

@@ -17,7 +17,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     Naming,
     no_terms,
 )
-from wind_sensors.diagnosis.explaining.fitting import Term, fit
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.moves import merged
 from wind_sensors.diagnosis.explaining.naming import (
     kept_if_better,
@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.explaining.naming import (
 )
 from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving import findings
 from wind_sensors.diagnosis.proving.findings import equal_explanations

@@ -29,7 +29,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     judged,
     no_terms,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, covariance_of, fit
+from wind_sensors.diagnosis.explaining.fitting import Fit, covariance_of, fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.leading import (
     explaining_what_stands_out,
@@ -40,6 +40,7 @@ from wind_sensors.diagnosis.explaining.moments import is_its_moment
 from wind_sensors.diagnosis.explaining.screening import scores_of
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.signatures import LARGER
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.diagnosis.proving.contradictions import undo_each_other, varies

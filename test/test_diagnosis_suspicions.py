@@ -11,7 +11,8 @@ from diagnosis_cases import STATION, baseline, diagnosed, recorded
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import fit
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.proving.suspicions import suspicion_beside, suspicion_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Angles, Recording

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.watch.believing import SOMETHING_ELSE, Rival, believed
 
 OFFSET = Term(catalogue()["vane_offset"], "vane", {"offset": 5.0})

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS
+from wind_sensors.diagnosis.explaining.terms import ALWAYS
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.verdict import Diagnosis

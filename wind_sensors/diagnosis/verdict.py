@@ -13,7 +13,6 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of, with_keys
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.naming import (
     kept_if_better,
@@ -23,6 +22,7 @@ from wind_sensors.diagnosis.explaining.naming import (
 )
 from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
 from wind_sensors.diagnosis.proving.decision import Verdict

@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.proving.decision import REMAINDER_P, REMAINDER_SCORES
 from wind_sensors.diagnosis.proving.findings import Finding

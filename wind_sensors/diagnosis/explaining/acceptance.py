@@ -15,10 +15,11 @@ from wind_sensors.diagnosis.explaining.explanation import (
     no_terms,
     total,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
 from wind_sensors.diagnosis.healthy.reference_lag import is_a_way_of_the_wind

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from wind_sensors.diagnosis.effects.definition import Parameter
-from wind_sensors.diagnosis.explaining.fitting import Fit, Term
+from wind_sensors.diagnosis.explaining.fitting import Fit
+from wind_sensors.diagnosis.explaining.terms import Term
 
 _MARGIN = 0.02
 """A value is at a bound within this share of the bounds' distance."""

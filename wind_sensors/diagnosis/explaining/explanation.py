@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_PARAMETER,
@@ -16,6 +16,7 @@ from wind_sensors.diagnosis.explaining.search import (
     interval_cost,
 )
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]

@@ -10,10 +10,10 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import dead_log
-from wind_sensors.diagnosis.explaining.fitting import Term, suggested
 from wind_sensors.diagnosis.explaining.intervals import interval_of
 from wind_sensors.diagnosis.explaining.jumps import late_stamps
 from wind_sensors.diagnosis.explaining.rotor_guesses import rotor_guesses
+from wind_sensors.diagnosis.explaining.terms import Term, suggested
 from wind_sensors.diagnosis.explaining.vane_guesses import vane_guesses
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses

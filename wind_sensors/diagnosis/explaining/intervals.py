@@ -16,7 +16,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
-from wind_sensors.diagnosis.explaining.fitting import Interval
+from wind_sensors.diagnosis.explaining.terms import Interval
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from scipy.ndimage import median_filter
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import Interval, Term
 from wind_sensors.diagnosis.explaining.intervals import NEAR_AN_END
+from wind_sensors.diagnosis.explaining.terms import Interval, Term
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -23,9 +23,10 @@ from wind_sensors.diagnosis.explaining.explanation import (
     judged,
     no_terms,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, fit
+from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN, ONSET_SHARE
 from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.regions import region_bank
 

@@ -9,8 +9,9 @@ from scipy.stats import ttest_1samp
 from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.activity import segments_of
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term
+from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -37,10 +37,8 @@ from wind_sensors.diagnosis.explaining.explanation import (
     total,
 )
 from wind_sensors.diagnosis.explaining.fitting import (
-    ALWAYS,
     ROUGHLY,
     Fit,
-    Term,
     cost_of,
     covariance_of,
     fit,
@@ -48,6 +46,7 @@ from wind_sensors.diagnosis.explaining.fitting import (
 )
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER, Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 MERGE_CANDIDATES = 8

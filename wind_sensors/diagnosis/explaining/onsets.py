@@ -11,15 +11,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.acceptance import plausible
 from wind_sensors.diagnosis.explaining.explanation import seen_in, total
-from wind_sensors.diagnosis.explaining.fitting import (
-    ALWAYS,
-    Fit,
-    Interval,
-    Term,
-    cost_of,
-    fit,
-    planted,
-)
+from wind_sensors.diagnosis.explaining.fitting import Fit, cost_of, fit
 from wind_sensors.diagnosis.explaining.intervals import (
     NEAR_AN_END,
     IntervalGains,
@@ -38,6 +30,7 @@ from wind_sensors.diagnosis.explaining.screening import (
 )
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_INTERVAL, Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]

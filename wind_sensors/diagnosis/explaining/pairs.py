@@ -31,8 +31,9 @@ from wind_sensors.diagnosis.explaining.explanation import (
     seen_in,
     total,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term
+from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.search import Searcher
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FloatArray = npt.NDArray[np.float64]

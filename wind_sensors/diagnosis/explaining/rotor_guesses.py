@@ -12,9 +12,9 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import BANDS
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import SlotIntervals, slot_intervals
 from wind_sensors.diagnosis.effects.output import slot_values
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, suggested
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
 from wind_sensors.diagnosis.explaining.ruled_out import comes_sooner
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, suggested
 from wind_sensors.station.losses import LOSS_SPEED
 from wind_sensors.station.model import Rotor, Station
 

@@ -26,7 +26,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     seen_in,
     total,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, planted
+from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.guesses import BLIND_IN_PARTS
 from wind_sensors.diagnosis.explaining.leading import (
     held_throughout,
@@ -41,6 +41,7 @@ from wind_sensors.diagnosis.explaining.onsets import (
 )
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FIRST_CANDIDATES = 9

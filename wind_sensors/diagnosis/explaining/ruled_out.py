@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, planted
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import headings
 from wind_sensors.station.model import Angle, Station
 

@@ -15,14 +15,7 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.bounds import without_idle, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import (
-    ALWAYS,
-    ROUGHLY,
-    Fit,
-    Term,
-    fit,
-    planted,
-)
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
@@ -39,6 +32,7 @@ from wind_sensors.diagnosis.explaining.signatures import (
     templates_of,
     with_larger,
 )
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import calm_share
 from wind_sensors.diagnosis.healthy.reference_lag import lag_weights, misplaced

@@ -12,8 +12,8 @@ from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observation import Channel
-from wind_sensors.diagnosis.explaining.fitting import Term, suggested
 from wind_sensors.diagnosis.explaining.intervals import interval_of
+from wind_sensors.diagnosis.explaining.terms import Term, suggested
 from wind_sensors.station.model import Angle
 from wind_sensors.station.signals import BoolArray, erratic
 

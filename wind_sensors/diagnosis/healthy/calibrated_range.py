@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.baseline import CALIBRATED_FROM, Baseline
 
 FEWEST_KNOWN = 0.25

@@ -17,8 +17,8 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.reference_place import Place
 from wind_sensors.diagnosis.effects.definition import STATION
-from wind_sensors.diagnosis.explaining.fitting import Term
 from wind_sensors.diagnosis.explaining.signatures import Template
+from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]

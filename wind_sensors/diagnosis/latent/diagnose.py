@@ -11,7 +11,7 @@ from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.latent.headings import (
     BLOCK,
     Felt,

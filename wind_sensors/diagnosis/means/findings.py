@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import CLIP, Bench, halves, huber
 from wind_sensors.diagnosis.means.fits import fit, intervals

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from wind_sensors.diagnosis.explaining.fitting import Term, planted
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.means.averages import BoolArray
 from wind_sensors.diagnosis.means.bench import (
     CLIP,

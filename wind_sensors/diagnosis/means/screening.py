@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import Effect, entry_of
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Interval, Term, planted
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.means.bench import CLIP, Bench, FloatArray, block_sums
 from wind_sensors.diagnosis.means.pair_effects import SINCE_A_MOMENT
 

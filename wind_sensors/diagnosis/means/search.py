@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from wind_sensors.diagnosis.effects.definition import Effect
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.means.bench import Bench, FloatArray
 from wind_sensors.diagnosis.means.fits import fit, held_out
 from wind_sensors.diagnosis.means.screening import SMALLEST_KEPT, screen

@@ -13,8 +13,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, simulated_with
 from wind_sensors.diagnosis.explaining.intervals import window_of
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, simulated_with
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.regions import Region, RegionBank

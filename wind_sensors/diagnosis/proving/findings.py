@@ -15,7 +15,8 @@ from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Naming,
 )
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, Fit, Term, simulated_with
+from wind_sensors.diagnosis.explaining.fitting import Fit
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, simulated_with
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.proving.proof import Proof, prove
 from wind_sensors.diagnosis.regions import Found, RegionBank, strongest

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, fit
+from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener, unstanding
 from wind_sensors.station.model import Station
 

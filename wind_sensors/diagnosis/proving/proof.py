@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import spectra
-from wind_sensors.diagnosis.explaining.fitting import Term, planted, simulated_with
+from wind_sensors.diagnosis.explaining.terms import Term, planted, simulated_with
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving.held_out import (
     Fold,

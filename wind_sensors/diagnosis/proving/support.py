@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS
 from wind_sensors.diagnosis.explaining.moments import needs_to_be_steady
+from wind_sensors.diagnosis.explaining.terms import ALWAYS
 from wind_sensors.diagnosis.proving.findings import Finding
 
 SHOWN_P = 0.05

@@ -12,9 +12,10 @@ import numpy as np
 from wind_sensors.diagnosis.effects.definition import STATION, Effect, entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
-from wind_sensors.diagnosis.explaining.fitting import ALWAYS, ROUGHLY, Fit, Term, fit, planted
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.station.model import Station
 

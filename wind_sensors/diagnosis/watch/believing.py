@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wind_sensors.diagnosis.explaining.fitting import Term
+from wind_sensors.diagnosis.explaining.terms import Term
 
 TEMPER = 3.0
 """Drop of the misfit that halves the belief or so: differences are not white, and the simulation

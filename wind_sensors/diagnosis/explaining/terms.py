@@ -1,0 +1,107 @@
+"""What may be said of a recording: effects at work, each on one instrument, in one interval."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import Effect, Parameter, with_effect
+from wind_sensors.station.model import Station
+
+Interval = tuple[float, float | None]
+ALWAYS: Interval = (0.0, None)
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect at work: one instrument, one set of values, one interval.
+
+    Attributes:
+        effect: The effect.
+        instrument: Name of the instrument, or `platform`.
+        values: Parameters, and what else the signals tell the effect's simulation.
+        interval: Start and end [s since the start of the recording]; (0, None) is always.
+        held: Names of parameters that keep their values in a fit: the signals tell them, or the
+            recording does not.
+    """
+
+    effect: Effect
+    instrument: str
+    values: Mapping[str, float]
+    interval: Interval = ALWAYS
+    held: frozenset[str] = frozenset()
+
+    def planted(self, station: Station) -> Station:
+        """The station with the effect."""
+        return with_effect(station, self.effect, self.instrument, self.values, self.interval)
+
+    @property
+    def grows(self) -> bool:
+        """Whether it approaches its size while it holds."""
+        return self.values.get(self.effect.grows, 0.0) > 0.0
+
+    @property
+    def relative_size(self) -> float:
+        """Size in units of the smallest worth reporting."""
+        return self.effect.relative_size(self.values)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and instrument."""
+        return self.effect.name, self.instrument
+
+    @property
+    def leaves_noise(self) -> bool:
+        """Whether what it does is drawn at random or hangs on the last digit."""
+        sticks = self.effect.sticks
+        return self.effect.noisy or (sticks is not None and sticks(self.values))
+
+    def fits(self, parameter: Parameter) -> bool:
+        """Whether a fit may move one of its parameters."""
+        return parameter.value_from == "fit" and parameter.name not in self.held
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the signals tell everything about it, that it is this among it."""
+        return self.effect.unmistakable
+
+    @property
+    def size_is_read(self) -> bool:
+        """Whether the raw signals say how large it is, as pulses' intervals do of a dead time."""
+        return any(
+            p.minimum > 0.0 and p.name in self.held and self.values[p.name] != p.healthy
+            for p in self.effect.parameters
+        )
+
+
+def suggested(effect: str, instrument: str, **values: float) -> Term:
+    """A term of the catalogue that always holds, with values to begin a fit from."""
+    return Term(catalogue()[effect], instrument, values)
+
+
+def planted(station: Station, terms: Sequence[Term]) -> Station:
+    """The station with all terms.
+
+    Terms that hold as they are all the time come first, so that changes build on them.
+    """
+    for term in sorted(terms, key=lambda t: t.interval != ALWAYS or t.grows):
+        station = term.planted(station)
+    return station
+
+
+def simulated_with(
+    comparison: Comparison, station: Station, terms: Sequence[Term]
+) -> Simulated:
+    """Simulation with a part of an explanation; without any effect, if that part cannot be.
+
+    A torque that grows with the rate runs away where the effect that held it back is left out.
+
+    Args:
+        comparison: The recording.
+        station: The station as commissioned.
+        terms: Some of the terms of an explanation that can be.
+    """
+    return comparison.possible(planted(station, terms)) or comparison.simulate(station)
