@@ -14,11 +14,11 @@ from wind_sensors.diagnosis.comparing.observing import BANDS
 from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.detectable import equals_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
 from wind_sensors.diagnosis.json_output import as_json, finding_json
 from wind_sensors.diagnosis.regions import Found, Region
-from wind_sensors.diagnosis.smallest_size import smallest_size
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.report.diagnosis_figures import activity_figure, statistics_figure
 from wind_sensors.report.diagnosis_page import page, when_text, where_text
@@ -183,11 +183,19 @@ def test_smallest_sizes_say_what_they_are_sizes_of() -> None:
     assert (told["parameter"], told["unit"]) == ("offset", "m/s")
 
 
-def test_the_parameter_of_a_smallest_size_is_one_that_was_tried() -> None:
-    missed = catalogue()["missed_pulses"]
-    assert smallest_size(missed, 0.003, "1", 0.3).parameter == "loss_probability"
-    tilted = catalogue()["angular_response"]
-    assert smallest_size(tilted, 0.2, "1", 2.0).parameter == "skewness"
+@pytest.mark.parametrize(
+    ("effect", "parameter", "equals"),
+    [
+        ("missed_pulses", "loss_probability", ["loss_probability"]),
+        ("angular_response", "skewness", ["skewness"]),
+        ("heading_deviation", "cosine", ["constant", "sine", "cosine"]),
+    ],
+)
+def test_a_smallest_size_is_one_of_all_parameters_that_are_tried_alike(
+    effect: str, parameter: str, equals: list[str]
+) -> None:
+    tried = catalogue()[effect]
+    assert equals_of(tried, next(p for p in tried.parameters if p.name == parameter)) == equals
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained, equal_explanations
 from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of, with_suspicion
 from wind_sensors.diagnosis.regions import Found, RegionBank
-from wind_sensors.diagnosis.smallest_size import SmallestSize, smallest_size
+from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.silence import Silent, silent_instruments
@@ -257,9 +257,7 @@ def diagnose(
         unexplained=Unexplained(
             remainder.p, remainder.share, judged.regions, "; ".join(part for part in told if part)
         ),
-        smallest_detectable={
-            name: smallest_size(known[name], *size) for name, size in judged.detectable.items()
-        },
+        smallest_detectable={name: each.size for name, each in judged.detectable.items()},
         station=station,
         baseline=baseline,
         comparison=comparison,

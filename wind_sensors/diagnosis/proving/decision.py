@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
+from wind_sensors.diagnosis.explaining.detectable import Detectable
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
 from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, simulated_with
@@ -246,7 +247,7 @@ def verdict_of(
     naming: Naming,
     equal: list[tuple[int, Alternative]],
     remainder: Remainder,
-    detectable: Mapping[str, tuple[float, str, float]],
+    detectable: Mapping[str, Detectable],
     located_p: float,
     excess: Excess,
 ) -> Verdict:
@@ -256,7 +257,7 @@ def verdict_of(
         naming: The explanation.
         equal: Explanations that fit as well.
         remainder: What it leaves.
-        detectable: Smallest detectable sizes: value, unit, in units of the smallest of interest.
+        detectable: Smallest detectable sizes, by effect.
         located_p: Probability, on a healthy day, of the strongest region without any effect.
         excess: Noise over that of healthy days.
     """
@@ -266,7 +267,7 @@ def verdict_of(
     if not naming.fit.terms:
         if remainder.is_structure:
             return "unknown"
-        sizes = sorted(size for _, _, size in detectable.values())
+        sizes = sorted(each.relative for each in detectable.values())
         if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
             return "inconclusive"
         return "none"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.explaining.detectable import smallest_detectable
+from wind_sensors.diagnosis.explaining.detectable import Detectable, smallest_detectable
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.explaining.search import Searcher
@@ -72,7 +72,7 @@ class Judgement:
         remainder: What it leaves in the region where it leaves most.
         excess: Noise over that of healthy days.
         calm: Whether nobody knows what is normal in such a wind.
-        detectable: Smallest detectable sizes: value, unit, in units of the smallest of interest.
+        detectable: Smallest detectable sizes, by effect.
         bank: Regions.
         regions_before: The strongest of them without any effect.
         regions: What is left, for people.
@@ -87,7 +87,7 @@ class Judgement:
     remainder: Remainder
     excess: Excess
     calm: bool
-    detectable: Mapping[str, tuple[float, str, float]]
+    detectable: Mapping[str, Detectable]
     bank: RegionBank
     regions_before: tuple[Found, ...]
     regions: tuple[Found, ...]
