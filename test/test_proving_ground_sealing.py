@@ -220,6 +220,15 @@ def test_an_effect_taken_out_is_told_of_decoys_as_often_and_of_no_pair_that_hide
     assert not any("sensor_swap" in c.planted for c in plan.cases if c.stratum == "pair")
 
 
+def test_no_pair_holds_an_effect_that_the_other_leaves_nothing_to_act_on() -> None:
+    plan = make_plan(0, np.random.default_rng(7), 1.0, 1, "B", {"pair": 600})
+    pairs = [set(c.planted) for c in plan.cases]
+    dead_logs = [pair for pair in pairs if "platform_velocity" in pair]
+    assert dead_logs
+    assert not any(pair & {"platform_velocity_scale", "frame_error"} for pair in dead_logs)
+    assert all(len(pair) == 2 for pair in pairs)
+
+
 def test_the_manifest_tells_what_to_leave_out_and_the_diagnosis_is_told(tmp_path: Path) -> None:
     spy = tmp_path / "spy.py"
     spy.write_text(SPY)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,9 @@ CONFUSABLE = (
 )
 ALONE = ("sensor_swap",)
 """Effects that no pair holds: they hide whatever is planted beside them."""
+
+NOTHING_TO_ACT_ON = {"platform_velocity": ("platform_velocity_scale", "frame_error")}
+"""Effects beside which others change nothing: a velocity of nought, scaled or turned, is one."""
 
 SPECIAL_CASES = ("platform_velocity", "air_density", "calibration_drift")
 """Effects that another one contains: a velocity scale of nought is a missing velocity, thin air of
@@ -211,8 +214,7 @@ def _planted(
     if stratum == "large":
         return (Planted(str(rng.choice(names)), 4.0),)
     if stratum == "pair":
-        pair = rng.permutation([n for n in names if n not in ALONE])[:2]
-        return tuple(Planted(str(n), 3.0) for n in pair)
+        return _pair([n for n in names if n not in ALONE], rng)
     if stratum == "confusable":
         able = [p for p in CONFUSABLE if p[0] in names and p[1] in names]
         first, second = able[int(rng.integers(len(able)))]
@@ -226,6 +228,18 @@ def _planted(
     if stratum == "too_little" and rng.random() < 0.5:
         return (Planted(str(rng.choice(names)), 2.0),)
     return ()
+
+
+def _pair(names: Sequence[str], rng: np.random.Generator) -> tuple[Planted, ...]:
+    """Two effects, of which neither takes away what the other acts on."""
+    order = [str(n) for n in rng.permutation(names)]
+    first = order[0]
+    second = next(n for n in order[1:] if not _idle_together(first, n))
+    return Planted(first, 3.0), Planted(second, 3.0)
+
+
+def _idle_together(one: str, other: str) -> bool:
+    return other in NOTHING_TO_ACT_ON.get(one, ()) or one in NOTHING_TO_ACT_ON.get(other, ())
 
 
 def _too_little(spec: RecordingSpec, rng: np.random.Generator) -> RecordingSpec:
