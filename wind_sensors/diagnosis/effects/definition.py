@@ -102,6 +102,8 @@ class Effect:
             where the straight calibration line is continued.
         contains: Effects of the same instrument that it can stand in for exactly; the two are
             never named together.
+        includes: Effects of other entries that it is in some of its values: a frame of the carrier
+            that leans is an axis that leans.
         occasional: It acts in one sector, one lull or one part of the record; others show again
             and again.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
@@ -145,6 +147,7 @@ class Effect:
     everywhere: bool = False
     shared: bool = False
     contains: frozenset[str] = frozenset()
+    includes: frozenset[str] = frozenset()
     occasional: bool = False
     smooths: bool = False
     shifts: bool = False

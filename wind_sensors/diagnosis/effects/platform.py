@@ -281,6 +281,7 @@ FRAME_ERROR = Effect(
     applies=_is_platform,
     update=_rotation,
     exact=True,
+    includes=frozenset({"axis_tilt"}),
     templates=(
         {"roll": 3.0, "pitch": 0.0, "velocity_turn": 0.0},
         {"roll": 0.0, "pitch": 3.0, "velocity_turn": 0.0},
