@@ -97,7 +97,7 @@ def test_a_frame_that_leans_is_an_axis_that_leans() -> None:
         moved = np.nanstd(series - straight[name])
         assert moved > 0.0
         # Turns about two axes do not commute.
-        assert np.nanstd(series - frame[name]) < 0.05 * moved
+        assert np.nanstd(series - frame[name]) < 0.1 * moved
 
 
 def test_a_log_that_dies_is_found_with_its_end() -> None:

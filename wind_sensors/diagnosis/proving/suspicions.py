@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.effects.definition import STATION, Effect, entry_of,
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
-from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, interval_cost
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -21,7 +21,7 @@ from wind_sensors.station.model import Station
 
 OUTDONE = 10.0
 """A name is withdrawn if a suspected fault in its place lowers the cost by more than this, each
-parameter paid for."""
+parameter and each beginning and end paid for."""
 
 STARTS = 2
 """From so many of its templates, those that explain most as they are, a fault is fitted."""
@@ -49,7 +49,7 @@ class Suspicion:
     Attributes:
         fault: What it would be, with its size.
         effect: Name of the effect in whose place it was tried; None: beside all of them.
-        gain: Drop of the cost by it, parameters paid for.
+        gain: Drop of the cost by it, parameters, beginnings and ends paid for.
     """
 
     fault: Term
@@ -192,7 +192,8 @@ def _beside_all(instruments: Sequence[str], station: Station) -> list[Trial]:
 
 
 def _price(whitener: Whitener, explanation: Fit) -> float:
-    """Cost of an explanation, its parameters paid for."""
+    """Cost of an explanation, its parameters, beginnings and ends paid for."""
     left = whitener.of(explanation.simulated)
     parameters = sum(len(t.effect.parameters) for t in explanation.terms)
-    return float(left @ left) + PENALTY_PER_PARAMETER * parameters
+    edges = sum(interval_cost(t) for t in explanation.terms)
+    return float(left @ left) + PENALTY_PER_PARAMETER * parameters + edges
