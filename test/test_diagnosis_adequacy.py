@@ -25,7 +25,6 @@ from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import form_signatures, trust_of, unstanding
-from wind_sensors.diagnosis.proving.contradictions import is_uneven
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.proving.support import (
@@ -72,19 +71,6 @@ def _slewed(recording: Recording, fastest: float) -> Recording:
         shown[k] = shown[k - 1] + np.clip(step, -most, most)
     wrapped = np.angle(np.exp(1j * shown))
     return replace(recording, angles={"vane": Angles(angles.time, wrapped)})
-
-
-def test_what_refuses_fast_turns_is_no_filter_for_it_leaves_slow_ones_alone() -> None:
-    filtered = with_effect(
-        STATION, catalogue()["low_pass_filter"], "vane", {"time_constant": 1.0}
-    )
-    for recording, uneven in (
-        (recorded(filtered, 62), False),
-        (_slewed(recorded(STATION, 62), np.radians(10.0)), True),
-    ):
-        naming = diagnose(recording, baseline(), with_proof=False).naming
-        assert naming.fit.terms
-        assert is_uneven(naming, STATION) is uneven
 
 
 def test_what_refuses_fast_turns_has_no_name() -> None:

@@ -21,12 +21,10 @@ from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.healthy.whitening import Whitener
-from wind_sensors.diagnosis.proving import contradictions
 from wind_sensors.diagnosis.proving.contradictions import (
     drop_by_own_delays,
     goes_with_speed,
     is_discordant,
-    is_uneven,
     varies,
 )
 from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
@@ -186,44 +184,6 @@ def test_two_effects_each_in_its_own_form_may_leave_more_than_one(
     naming = Naming(fitted, null, null, null.of(searcher.bank.without), 2000.0)
     left = Remainder(score=1.5, p=0.002, share=share)
     assert verdict_of(naming, [], left, {}, 0.002, Excess()) == verdict
-
-
-@pytest.mark.parametrize(
-    ("drop", "gain", "interval", "uneven"),
-    [
-        (24.0, 250.0, ALWAYS, True),
-        (24.0, 250.0, (300.0, None), False),
-        (31.0, 400.0, (300.0, None), True),
-        (13.0, 60.0, (300.0, None), True),
-        (11.0, 60.0, ALWAYS, False),
-    ],
-)
-def test_few_gusts_make_the_lively_moments_of_a_part_of_the_record(
-    monkeypatch: pytest.MonkeyPatch, drop: float, gain: float, interval: Interval, uneven: bool
-) -> None:
-    searcher, null = searched("vane_inertia", "vane", {"inertia_factor": 2.0}, interval)
-    heavy = Term(catalogue()["vane_inertia"], "vane", {"inertia_factor": 2.0}, interval)
-    fitted = fit(null, STATION, [heavy], searcher.bank.without, iterations=0)
-    naming = Naming(fitted, null, null, null.of(searcher.bank.without), gain)
-    monkeypatch.setattr(contradictions, "unevenness", lambda *_: drop)
-    assert is_uneven(naming, STATION) is uneven
-
-
-@pytest.mark.parametrize(
-    ("held", "uneven"),
-    [(("dead_time",), False), (("loss_probability",), True), ((), True)],
-)
-def test_a_size_that_the_pulses_say_is_one_whatever_a_fit_would_make_of_it(
-    monkeypatch: pytest.MonkeyPatch, held: tuple[str, ...], uneven: bool
-) -> None:
-    """Where pulses come nearly as fast as the counter follows, a gust loses every second one."""
-    dead = {"dead_time": 0.0075, "loss_probability": 0.0, "loss_growth": 0.0}
-    searcher, null = searched("missed_pulses", "cup", dead)
-    blind = Term(catalogue()["missed_pulses"], "cup", dead, held=frozenset(held))
-    fitted = fit(null, STATION, [blind], searcher.bank.without, iterations=0)
-    naming = Naming(fitted, null, null, null.of(searcher.bank.without), 100.0)
-    monkeypatch.setattr(contradictions, "unevenness", lambda *_: 50.0)
-    assert is_uneven(naming, STATION) is uneven
 
 
 def test_a_fit_leaves_a_hollow_that_small_steps_stay_in() -> None:

@@ -12,7 +12,8 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.fitting import fit
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_INTERVAL
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.proving.suspicions import suspicion_beside, suspicion_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Angles, Recording
@@ -75,6 +76,22 @@ def test_a_bearing_that_catches_all_the_time_is_no_friction_that_begins() -> Non
     assert suspicion is not None
     assert suspicion.fault.key == ("catch", "vane")
     assert suspicion.fault.interval == ALWAYS
+
+
+def test_what_always_holds_is_spared_the_price_of_a_beginning_and_an_end() -> None:
+    naming = diagnose(_behind_play(recorded(STATION, 66), 14.0), baseline()).naming
+    friction = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
+
+    def gain_over(interval: Interval) -> float:
+        held = fit(naming.whitener, STATION, [replace(friction, interval=interval)], None, 0)
+        suspicion = suspicion_of(replace(naming, fit=held), STATION)
+        assert suspicion is not None
+        assert (suspicion.fault.effect.name, suspicion.fault.interval) == ("play", ALWAYS)
+        own = naming.whitener.of(held.simulated)
+        return suspicion.gain - float(own @ own)
+
+    edges = 2.0 * PENALTY_PER_INTERVAL
+    assert gain_over((0.5, 590.0)) - gain_over(ALWAYS) == pytest.approx(edges, abs=0.5)
 
 
 def test_a_fin_that_gives_way_is_no_heavy_vane() -> None:

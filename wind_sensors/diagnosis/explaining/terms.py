@@ -68,14 +68,6 @@ class Term:
         """Whether the signals tell everything about it, that it is this among it."""
         return self.effect.unmistakable
 
-    @property
-    def size_is_read(self) -> bool:
-        """Whether the raw signals say how large it is, as pulses' intervals do of a dead time."""
-        return any(
-            p.minimum > 0.0 and p.name in self.held and self.values[p.name] != p.healthy
-            for p in self.effect.parameters
-        )
-
 
 def suggested(effect: str, instrument: str, **values: float) -> Term:
     """A term of the catalogue that always holds, with values to begin a fit from."""

@@ -59,22 +59,6 @@ GROWS_SHARE = 0.02
 """Nor may a size that grows or shrinks steadily through the record drop it by more than this, or
 than this share of the gain: a clock that drifts is no delay."""
 
-LIVELY_TIME = 5.0
-"""A signal is lively or quiet by how fast it moves within so many seconds."""
-
-UNEVEN = 12.0
-UNEVEN_SHARE = 0.015
-"""An effect has one size, whether its signal is lively or quiet: another one in lively moments must
-not drop the cost by more than this, or than this share of the gain (a form that errs by a tenth
-brings a hundredth). What refuses jumps, or sticks and slips in its own way, is taken for a filter
-or for friction otherwise."""
-
-PASSING_UNEVEN = 30.0
-PASSING_UNEVEN_SHARE = 0.1
-"""In a part of the record a few gusts make the lively moments, and their form does not average out:
-what begins or ends inside may differ by this share of its gain, as long as that is no more than the
-first."""
-
 SPEED_TIME = 5.0
 WITH_SPEED = 14.0
 WITH_SPEED_SHARE = 0.02
@@ -256,20 +240,6 @@ def _drop_by_growth(cells: FloatArray, left: FloatArray) -> float:
     return float(growing @ left) ** 2 / max(float(growing @ growing), 1.0)
 
 
-def unevenness(naming: Naming, station: Station, term: Term) -> float:
-    """Drop of the cost if an effect had one size while its signals are lively, another while not.
-
-    Args:
-        naming: The explanation.
-        station: As commissioned.
-        term: One of its effects.
-    """
-    dt = naming.adequate.comparison.grid.dt
-    return _drop_between_halves(
-        naming, station, term, lambda without, name: _lively(without.series[name], dt)
-    )
-
-
 def dependence_on_speed(naming: Naming, station: Station, term: Term) -> float:
     """Drop of the cost if an effect had another size in strong wind than in weak wind.
 
@@ -369,33 +339,9 @@ def _drop_by_own_sizes(naming: Naming, parts: FloatArray) -> float:
     return float(power @ (sizes - common) ** 2)
 
 
-def _lively(series: FloatArray, dt: float) -> FloatArray:
-    """Weights from nought where a series is quiet to one where it is lively, shape (n,)."""
-    moving = uniform_filter1d(np.gradient(series) ** 2, round(LIVELY_TIME / dt), mode="nearest")
-    return np.asarray(np.clip(2.0 * _ranks(moving) - 0.5, 0.0, 1.0))
-
-
 def _ranks(series: FloatArray) -> FloatArray:
     """From nought at the smallest value to one at the largest, shape (n,)."""
     return np.asarray(np.argsort(np.argsort(series)) / max(series.size - 1, 1))
-
-
-def is_uneven(naming: Naming, station: Station) -> bool:
-    """Whether an effect has another size while its signals are lively than while they are quiet.
-
-    Those whose form is certain are held to one size in all parts of the record instead. Of a size
-    that is read from the raw signals a fit says nothing.
-    """
-    for term in naming.fit.terms:
-        told = term.is_told or term.size_is_read
-        if term.effect.exact or term.effect.legible or told:
-            continue
-        most = max(UNEVEN, UNEVEN_SHARE * naming.gain)
-        if term.interval != ALWAYS:
-            most = max(most, min(PASSING_UNEVEN, PASSING_UNEVEN_SHARE * naming.gain))
-        if unevenness(naming, station, term) > most:
-            return True
-    return False
 
 
 def goes_with_speed(naming: Naming, station: Station) -> bool:

@@ -139,9 +139,10 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
     """Explanations that fit as well with one effect exchanged: its position, the explanation.
 
     One with more parameters could follow what the simulation is inexact about: if it is behind all
-    the same, only the likelihood speaks for it. What contains an effect and fits no better adds
-    something to it that the recording does not show. What passes and brings too little to be named
-    by itself is no rival either, nor beside what always holds what would not be named beside it.
+    the same, only the likelihood speaks for it. What contains an effect, or includes one that is
+    named, and fits no better adds something to it that the recording does not show. What passes and
+    brings too little to be named by itself is no rival either, nor beside what always holds what
+    would not be named beside it.
     """
     always = all(t.interval == ALWAYS for t in naming.fit.terms)
     own = [t.key for t in naming.fit.terms]
@@ -156,8 +157,9 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
         if len(theirs) != len(own) or len(missing) != 1 or theirs[-1] in seen:
             continue
         newest, rival = alternative.fit.terms[-1], naming.fit.terms[missing[0]]
-        stood_in_for = newest.effect.contains | newest.effect.includes
-        if rival.effect.name in stood_in_for and alternative.behind > 0.0:
+        contained = rival.effect.name in newest.effect.contains
+        included = any(t.effect.name in newest.effect.includes for t in naming.fit.terms)
+        if (contained or included) and alternative.behind > 0.0:
             continue
         least = passing_gain(newest, beside=always)
         if len(own) == 1 and naming.gain - alternative.behind < least:

@@ -23,7 +23,6 @@ from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess
 from wind_sensors.diagnosis.proving.contradictions import (
     goes_with_speed,
     is_discordant,
-    is_uneven,
     undo_each_other,
     varies,
 )
@@ -284,8 +283,6 @@ def _upheld(
 
 def _contradiction(naming: Naming, station: Station) -> str:
     """How the signals contradict that an effect has one size; empty: they do not."""
-    if is_uneven(naming, station):
-        return "with another size in lively minutes than in quiet ones"
     if goes_with_speed(naming, station):
         return "with another size in strong wind than in weak wind"
     if is_discordant(naming, station):
