@@ -25,6 +25,7 @@ from wind_sensors.diagnosis.proving.contradictions import (
     drop_by_own_delays,
     goes_with_speed,
     is_discordant,
+    is_otherwise_in_eddies,
     varies,
 )
 from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
@@ -184,6 +185,27 @@ def test_two_effects_each_in_its_own_form_may_leave_more_than_one(
     naming = Naming(fitted, null, null, null.of(searcher.bank.without), 2000.0)
     left = Remainder(score=1.5, p=0.002, share=share)
     assert verdict_of(naming, [], left, {}, 0.002, Excess()) == verdict
+
+
+@pytest.mark.parametrize("made_good", [False, True])
+def test_a_filter_takes_from_the_power_of_eddies_what_it_takes_from_the_course(
+    made_good: bool,
+) -> None:
+    values = {"time_constant": 1.0}
+    filtered = with_effect(STATION, catalogue()["low_pass_filter"], "vane", values)
+    recording = replace(recorded(filtered, 72), station=STATION)
+    seen = recording.angles["vane"]
+    # Another day's eddies, of which the filter lets none through, in the place of those lost.
+    lost = recorded(STATION, 73).angles["vane"].angle - recorded(filtered, 73).angles["vane"].angle
+    shown = np.angle(np.exp(1j * (seen.angle + (lost if made_good else 0.0))))
+    recording = replace(recording, angles={"vane": Angles(seen.time, shown)})
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
+    term = Term(catalogue()["low_pass_filter"], "vane", values)
+    null = searcher.whitener(searcher.bank.without)
+    there = fit(null, STATION, [term], searcher.bank.without, iterations=0)
+    adequate = searcher.whitener(there.simulated, there)
+    naming = Naming(there, null, adequate, null.of(searcher.bank.without), 100.0)
+    assert is_otherwise_in_eddies(naming, STATION) is made_good
 
 
 def test_a_fit_leaves_a_hollow_that_small_steps_stay_in() -> None:

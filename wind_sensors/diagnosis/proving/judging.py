@@ -23,6 +23,7 @@ from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess
 from wind_sensors.diagnosis.proving.contradictions import (
     goes_with_speed,
     is_discordant,
+    is_otherwise_in_eddies,
     undo_each_other,
     varies,
 )
@@ -287,6 +288,8 @@ def _contradiction(naming: Naming, station: Station) -> str:
         return "with another size in strong wind than in weak wind"
     if is_discordant(naming, station):
         return "with another size on one signal than on another"
+    if is_otherwise_in_eddies(naming, station):
+        return "with another size in the power of eddies than in the course of the signal"
     return ""
 
 
