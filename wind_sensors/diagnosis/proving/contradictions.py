@@ -312,14 +312,18 @@ def discord_of_eddies(naming: Naming, station: Station, term: Term) -> float:
 def is_otherwise_in_eddies(naming: Naming, station: Station) -> bool:
     """Whether an effect has another size in the power of eddies than in the course of signals.
 
-    Not asked of what the signals tell by themselves.
+    Not asked of damping and of what sticks or is drawn at random, whose jumps come when they like,
+    nor of what the signals tell by themselves.
     """
     most = max(DISCORD, DISCORD_SHARE * naming.gain)
-    return any(
-        discord_of_eddies(naming, station, term) > most
-        for term in naming.fit.terms
-        if not (term.effect.legible or term.is_told)
-    )
+    for term in naming.fit.terms:
+        effect = term.effect
+        own_law = effect.own_law or term.leaves_noise
+        if own_law or effect.legible or term.is_told:
+            continue
+        if discord_of_eddies(naming, station, term) > most:
+            return True
+    return False
 
 
 def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:
