@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.json_output import finding_json, silent_json
 from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.station.model import Station
 from wind_sensors.station.silence import Silent
 

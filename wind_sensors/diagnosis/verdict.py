@@ -12,6 +12,7 @@ from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of, with_keys
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.naming import (
@@ -29,7 +30,6 @@ from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained, equal_explanations
 from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of, with_suspicion
 from wind_sensors.diagnosis.regions import Found, RegionBank
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
 from wind_sensors.station.silence import Silent, silent_instruments

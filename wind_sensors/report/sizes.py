@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.report.names import words
 from wind_sensors.station.model import Station
 

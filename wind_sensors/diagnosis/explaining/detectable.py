@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.acceptance import ACCEPTED_GAIN
 from wind_sensors.diagnosis.explaining.screening import group_templates
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, Searcher
 from wind_sensors.diagnosis.healthy.whitening import Whitener
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.latent.headings import (
     BLOCK,
@@ -28,7 +29,6 @@ from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means import panels, silences
 from wind_sensors.diagnosis.means.averages import Averages
@@ -41,7 +42,6 @@ from wind_sensors.diagnosis.means.vanes import (
 )
 from wind_sensors.diagnosis.outcome import Outcome, verdict_of
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 from wind_sensors.errors import UserError
 from wind_sensors.station.signals import Recording, Series
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import CLIP, Bench, halves, huber
@@ -21,7 +22,6 @@ from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
-from wind_sensors.diagnosis.smallest_size import SmallestSize
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]

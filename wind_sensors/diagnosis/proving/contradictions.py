@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -257,9 +257,16 @@ def dependence_on_speed(naming: Naming, station: Station, term: Term) -> float:
         term: One of its effects.
     """
     comparison = naming.adequate.comparison
+    without = _without(naming, station, term)
+    if without is None:
+        return 0.0
     width = round(SPEED_TIME / comparison.grid.dt)
     strong = _ranks(uniform_filter1d(comparison.speed, width, mode="nearest"))
-    return _drop_between_halves(naming, station, term, lambda without, name: strong)
+    halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
+    for k in range(len(comparison.channels)):
+        for half, part in zip(halves, (1.0 - strong, strong), strict=True):
+            _put(half, naming, without, k, part)
+    return _drop_by_own_sizes(naming, halves)
 
 
 def discord(naming: Naming, station: Station, term: Term) -> float:
@@ -270,17 +277,13 @@ def discord(naming: Naming, station: Station, term: Term) -> float:
         station: As commissioned.
         term: One of its effects.
     """
-    null = naming.adequate
-    comparison = null.comparison
-    without = _without(naming, station, term)
+    comparison = naming.adequate.comparison
     # What a vane does to a propeller that it turns away from the wind is not its own size.
-    if without is None or any(c.instrument == term.instrument for c in comparison.channels):
+    if any(c.instrument == term.instrument for c in comparison.channels):
         return 0.0
-    change = naming.fit.simulated.flat(comparison.channels) - without.flat(comparison.channels)
-    change = np.nan_to_num(change) * comparison.weights(null.trust)
     channel = comparison.channel_of_each
-    each = np.array([np.where(channel == k, change, 0.0) for k in range(len(comparison.channels))])
-    return _drop_by_own_sizes(naming, each[np.any(each, axis=1)])
+    on_each = [channel == k for k in range(len(comparison.channels))]
+    return _drop_by_sizes_on(naming, station, term, on_each)
 
 
 def is_discordant(naming: Naming, station: Station) -> bool:
@@ -297,16 +300,11 @@ def discord_of_eddies(naming: Naming, station: Station, term: Term) -> float:
         station: As commissioned.
         term: One of its effects.
     """
-    null = naming.adequate
-    comparison = null.comparison
-    without = _without(naming, station, term)
-    if without is None:
-        return 0.0
-    change = naming.fit.simulated.flat(comparison.channels) - without.flat(comparison.channels)
-    change = np.nan_to_num(change) * comparison.weights(null.trust)
+    comparison = naming.adequate.comparison
     kind = comparison.part_of_each // len(comparison.channels)
-    each = np.array([np.where(np.isin(kind, kinds), change, 0.0) for kinds in (COURSE, POWER)])
-    return _drop_by_own_sizes(naming, each[np.any(each, axis=1)])
+    return _drop_by_sizes_on(
+        naming, station, term, [np.isin(kind, kinds) for kinds in (COURSE, POWER)]
+    )
 
 
 def is_otherwise_in_eddies(naming: Naming, station: Station) -> bool:
@@ -332,31 +330,26 @@ def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:
     return naming.adequate.comparison.possible(planted(station, others))
 
 
-def _drop_between_halves(
-    naming: Naming,
-    station: Station,
-    term: Term,
-    weight_of: Callable[[Simulated, str], FloatArray],
+def _drop_by_sizes_on(
+    naming: Naming, station: Station, term: Term, places: Sequence[npt.NDArray[np.bool_]]
 ) -> float:
-    """Drop of the cost if an effect had a size of its own in each of two parts of the record.
+    """Drop of the cost if an effect had a size of its own on each part of what is compared.
 
     Args:
         naming: The explanation.
         station: As commissioned.
         term: One of its effects.
-        weight_of: Gives, from the simulation without it and a channel's name, how far each instant
-            belongs to the second part, from nought to one.
+        places: Which of what is compared belong to each part, each of shape (l,).
     """
-    comparison = naming.adequate.comparison
+    null = naming.adequate
+    channels = null.comparison.channels
     without = _without(naming, station, term)
     if without is None:
         return 0.0
-    halves = np.zeros((2, comparison.coefficients * len(comparison.channels)))
-    for k, channel in enumerate(comparison.channels):
-        weight = weight_of(without, channel.name)
-        for half, part in zip(halves, (1.0 - weight, weight), strict=True):
-            _put(half, naming, without, k, part)
-    return _drop_by_own_sizes(naming, halves)
+    change = naming.fit.simulated.flat(channels) - without.flat(channels)
+    change = np.nan_to_num(change) * null.comparison.weights(null.trust)
+    each = np.array([np.where(place, change, 0.0) for place in places])
+    return _drop_by_own_sizes(naming, each[np.any(each, axis=1)])
 
 
 def _put(part: FloatArray, naming: Naming, without: Simulated, k: int, weight: FloatArray) -> None:
