@@ -21,6 +21,7 @@ from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.proving import contradictions
 from wind_sensors.diagnosis.proving.contradictions import (
     drop_by_own_delays,
     goes_with_speed,
@@ -206,6 +207,27 @@ def test_a_filter_takes_from_the_power_of_eddies_what_it_takes_from_the_course(
     adequate = searcher.whitener(there.simulated, there)
     naming = Naming(there, null, adequate, null.of(searcher.bank.without), 100.0)
     assert is_otherwise_in_eddies(naming, STATION) is made_good
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "asked"),
+    [
+        ("vane_inertia", {"inertia_factor": 2.0}, True),
+        ("timestamp_latency", {"latency": 0.5}, False),
+        ("vane_damping", {"damping_factor": 2.0}, False),
+        ("vane_friction", {"friction_speed": 2.0}, False),
+    ],
+)
+def test_what_jumps_when_it_likes_or_only_comes_late_may_differ_in_its_eddies(
+    monkeypatch: pytest.MonkeyPatch, effect: str, values: dict[str, float], asked: bool
+) -> None:
+    searcher, null = searched(effect, "vane", values)
+    there = fit(
+        null, STATION, [Term(catalogue()[effect], "vane", values)], searcher.bank.without, 0
+    )
+    naming = Naming(there, null, null, null.of(searcher.bank.without), 100.0)
+    monkeypatch.setattr(contradictions, "_drop_by_sizes_on", lambda *_: 50.0)
+    assert is_otherwise_in_eddies(naming, STATION) is asked
 
 
 def test_a_fit_leaves_a_hollow_that_small_steps_stay_in() -> None:

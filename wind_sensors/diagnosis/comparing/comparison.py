@@ -34,6 +34,12 @@ from wind_sensors.station.signals import Angles, Pulses, Recording
 
 FloatArray = npt.NDArray[np.float64]
 
+COURSE, POWER, STATISTICS, ACTIVITY = range(4)
+"""Kinds of what is compared: series, power of eddies, statistics of raw signals, and power from
+half-minute to half-minute."""
+
+OF_EDDIES = (POWER, ACTIVITY)
+
 LOW_END = 0.02
 """Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
 
@@ -312,19 +318,23 @@ class Comparison(View):
         )
 
     @property
-    def part_of_each(self) -> npt.NDArray[np.int_]:
-        """Number of the part to which each of what is compared belongs, shape (l,).
-
-        Parts are series, spectral bands, statistics of raw signals and activity of each channel.
-        """
+    def kind_of_each(self) -> npt.NDArray[np.int_]:
+        """Kind of each of what is compared, shape (l,)."""
         statistics = [
-            np.where(np.arange(self.measured.statistics[c.name].size) < BANDS, 1, 2)
+            np.where(np.arange(self.measured.statistics[c.name].size) < BANDS, POWER, STATISTICS)
             for c in self.channels
         ]
         activities = sum(self.measured.levels[c.name].size for c in self.channels)
-        series = np.zeros(self.coefficients * len(self.channels), dtype=np.int_)
-        kinds = np.concatenate((series, *statistics, np.full(activities, 3)))
-        return np.asarray(self.channel_of_each + len(self.channels) * kinds)
+        series = np.full(self.coefficients * len(self.channels), COURSE)
+        return np.concatenate((series, *statistics, np.full(activities, ACTIVITY)))
+
+    @property
+    def part_of_each(self) -> npt.NDArray[np.int_]:
+        """Number of the part to which each of what is compared belongs, shape (l,).
+
+        Parts are kinds of each channel: those of the first kind come first.
+        """
+        return np.asarray(self.channel_of_each + len(self.channels) * self.kind_of_each)
 
     def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
         """How far `vector` falls when what is compared rises by one, shape (l,)."""

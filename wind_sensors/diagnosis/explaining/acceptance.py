@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.comparing.comparison import OF_EDDIES
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.explaining.bounds import run_away
 from wind_sensors.diagnosis.explaining.explanation import (
@@ -204,14 +205,11 @@ def gained_by_eddies(whitener: Whitener, before: Fit, after: Fit) -> float:
         whitener: A null.
         before, after: Two explanations.
     """
-    comparison = whitener.comparison
-    channels = len(comparison.channels)
     drop = (
         whitener.noise_whitened(before.simulated) ** 2
         - whitener.noise_whitened(after.simulated) ** 2
     )
-    gained = np.bincount(comparison.part_of_each, drop)
-    return float(gained[channels : 2 * channels].sum() + gained[3 * channels :].sum())
+    return float(drop[np.isin(whitener.comparison.kind_of_each, OF_EDDIES)].sum())
 
 
 def inexactness(searcher: Searcher, whitener: Whitener, current: Fit, longer: Fit) -> float:

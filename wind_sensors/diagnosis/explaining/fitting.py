@@ -9,18 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
-from wind_sensors.diagnosis.effects.definition import (
-    PLATFORM,
-    STATION,
-    Parameter,
-)
+from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION, Parameter
 from wind_sensors.diagnosis.explaining.terms import Interval, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
-
 
 _LARGEST_DAMPING = 1e5
 
