@@ -51,8 +51,8 @@ def searcher() -> Searcher:
     [
         ("calibration_offset", {"offset": 0.2}, 1, 20.0, True),
         ("calibration_offset", {"offset": 0.2}, 2, 20.0, False),
-        ("calibration_offset", {"offset": 0.2}, 2, 9.0, False),
-        ("calibration_offset", {"offset": 0.2}, 2, 7.0, True),
+        ("calibration_offset", {"offset": 0.2}, 2, 3.0, False),
+        ("calibration_offset", {"offset": 0.2}, 2, 1.0, True),
         ("damaged_cup", {"torque_harmonic": 0.0, "gain": 1.03}, 2, 1.0, False),
         ("damaged_cup", {"torque_harmonic": 0.0, "gain": 1.03}, 2, -1.0, True),
     ],

@@ -13,7 +13,8 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of, with_keys
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
-from wind_sensors.diagnosis.explaining.explanation import Naming
+from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
+from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.naming import (
     kept_if_better,
@@ -21,7 +22,7 @@ from wind_sensors.diagnosis.explaining.naming import (
     named_alone,
     named_instead,
 )
-from wind_sensors.diagnosis.explaining.rounds import first_round
+from wind_sensors.diagnosis.explaining.rounds import FirstRound, first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
@@ -100,15 +101,14 @@ def _explained(
         search: Prepares the search of a comparison.
         report: Gives a phase's progress function.
     """
-    searcher = search(comparison)
-    first = first_round(searcher)
+    searcher, first = _first_look(comparison, search)
 
     def seen_moving(terms: Sequence[Term]) -> tuple[Searcher, Naming] | None:
         moved = _moving(comparison, terms)
         if moved is None:
             return None
-        again = search(moved)
-        naming = name(again, first_round(again), report("fitting effects"))
+        again, anew = _first_look(moved, search)
+        naming = name(again, anew, report("fitting effects"))
         return (again, naming) if _motion(naming.fit.terms) else None
 
     found = seen_moving(first.terms)
@@ -118,6 +118,39 @@ def _explained(
     if _motion(naming.fit.terms) != _motion(first.terms):
         found = seen_moving(naming.fit.terms)
     return found or (searcher, naming)
+
+
+def _first_look(
+    comparison: Comparison, search: Callable[[Comparison], Searcher]
+) -> tuple[Searcher, FirstRound]:
+    """Single effects of a recording, without the seconds in which vanes turn round apart.
+
+    Args:
+        comparison: The recording.
+        search: Prepares the search of a comparison.
+    """
+    searcher = search(comparison)
+    first = first_round(searcher)
+    if first.led is None:
+        return searcher, first
+    leader, losers = first.led
+    following = _where_vanes_follow(comparison, leader.fit, losers)
+    if following is None:
+        return searcher, first
+    searcher = search(following)
+    return searcher, first_round(searcher)
+
+
+def _where_vanes_follow(
+    comparison: Comparison, leader: Fit, losers: Sequence[Alternative]
+) -> Comparison | None:
+    """The comparison without the seconds in which a vane turns round apart from one of its
+    simulations; None: they hold too little of the misfit that the leader leaves."""
+    explained = [leader.simulated, *(a.fit.simulated for a in losers)]
+    follows = comparison.where_vanes_follow(explained)
+    if comparison.misfit_outside(follows, leader.simulated) <= TURNING_MISFIT:
+        return None
+    return comparison.within(follows)
 
 
 def _motion(terms: Sequence[Term]) -> list[Term]:
@@ -228,14 +261,6 @@ def diagnose(
 
     searcher, naming = _explained(comparison, search, report)
     comparison = searcher.comparison
-    if naming.fit.terms:
-        rivals = [naming.fit.simulated, *(a.fit.simulated for a in naming.alternatives)]
-        follows = comparison.where_vanes_follow(rivals)
-        if comparison.misfit_outside(follows, naming.fit.simulated) > TURNING_MISFIT:
-            before = naming
-            searcher, naming = _explained(comparison.within(follows), search, report)
-            comparison = searcher.comparison
-            naming = kept_if_better(searcher, before, naming)
     judged = first_claim(
         searcher,
         naming,

@@ -36,6 +36,10 @@ REPORTED_TOGETHER = 4.0
 and the truth may be in no catalogue, less tells no two apart: of 43 leaders on concealed data with
 a rival within this, 19 were wrong, of fourteen with the nearest one between this and six, one."""
 
+TOGETHER_WITH_MORE = 1.0
+"""The same of a rival with more parameters: it can take more shapes and fits worse all the same. Of
+24 on concealed data none was the truth."""
+
 LARGEST_EQUAL = 60.0
 """Explanations are never equal if their penalised costs differ by more."""
 
@@ -139,7 +143,7 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
     """Explanations that fit as well with one effect exchanged: its position, the explanation.
 
     One with more parameters could follow what the simulation is inexact about: if it is behind all
-    the same, only the likelihood speaks for it. What contains an effect, or includes one that is
+    the same, it must be close. What contains an effect, or includes one that is
     named, and fits no better adds something to it that the recording does not show. What passes and
     brings too little to be named by itself is no rival either, nor beside what always holds what
     would not be named beside it.
@@ -147,8 +151,7 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
     always = all(t.interval == ALWAYS for t in naming.fit.terms)
     own = [t.key for t in naming.fit.terms]
     share = EQUAL_SHARE if len(own) == 1 else 0.0
-    likely = 2.0 * REPORTED_TOGETHER
-    inexact = max(likely, min(share * naming.gain, LARGEST_EQUAL))
+    inexact = max(2.0 * REPORTED_TOGETHER, min(share * naming.gain, LARGEST_EQUAL))
     seen = set(own)
     out: list[tuple[int, Alternative]] = []
     for alternative in naming.alternatives:
@@ -164,7 +167,8 @@ def equal_explanations(naming: Naming) -> list[tuple[int, Alternative]]:
         least = passing_gain(newest, beside=always)
         if len(own) == 1 and naming.gain - alternative.behind < least:
             continue
-        limit = likely if alternative.fit.active > naming.fit.active else inexact
+        more = alternative.fit.active > naming.fit.active
+        limit = 2.0 * TOGETHER_WITH_MORE if more else inexact
         if alternative.behind < limit and _alike(naming, alternative):
             seen.add(theirs[-1])
             out.append((missing[0], alternative))
