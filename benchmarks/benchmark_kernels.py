@@ -23,11 +23,12 @@ from rich.table import Table
 from scipy.integrate import odeint
 
 from wind_sensors.compiled import compiled
-from wind_sensors.diagnosis.comparing.observation import Grid
+from wind_sensors.diagnosis.comparing.observation import Grid, rate_series
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import interval_statistics
 from wind_sensors.simulation import Drive, edge_times, respond
 from wind_sensors.simulation.pulses import rotor_signals
 from wind_sensors.station.model import Cup, Input, Propeller, Station, Vane
+from wind_sensors.station.signals import Pulses
 from wind_sensors.turbulence.synthesis import isotropic_spec, synthesize
 
 FloatArray = npt.NDArray[np.float64]
@@ -178,17 +179,25 @@ def _report_intervals(console: Console, drive: Drive) -> None:
     rotor = _station("cup").instruments[0].model_copy(update={"pulses_per_revolution": 36})
     assert isinstance(rotor, Cup)
     station = Station(instruments=(rotor,))
-    pulses = rotor_signals(respond(station, drive), "cup")
+    clean = rotor_signals(respond(station, drive), "cup")
+    rng = np.random.default_rng(1)
+    doubled = clean.time[rng.random(clean.time.size) < 0.03] + rng.integers(100_000, 1_000_000)
+    bouncing = Pulses(np.sort(np.concatenate((clean.time, doubled))))
     grid = Grid(drive.start_ns, 0.1, int(SECONDS / 0.1))
     direction, speed = np.zeros(grid.n), np.full(grid.n, 8.0)
-    spent = best(lambda: interval_statistics(pulses, rotor, direction, speed, grid))
-    seconds = grid.seconds(pulses.time)
-    least = best(lambda: _intervals_read(seconds))
-    console.print(
-        f"statistics of {seconds.size} intervals in {spent * 1e3:.2f} ms, "
-        f"{spent / seconds.size * 1e9:.0f} ns each, {spent / least:.0f} times as long as reading "
-        "them once"
-    )
+    for words, pulses in (("", clean), (" of a contact that bounces", bouncing)):
+        seconds = grid.seconds(pulses.time)
+        least = best(partial(_intervals_read, seconds))
+        for what, function in (
+            ("statistics", partial(interval_statistics, pulses, rotor, direction, speed, grid)),
+            ("rates", partial(rate_series, pulses, rotor, grid)),
+        ):
+            spent = best(function)
+            console.print(
+                f"{what} of {seconds.size} intervals{words} in {spent * 1e3:.2f} ms, "
+                f"{spent / seconds.size * 1e9:.1f} ns each, {spent / least:.0f} times as long as "
+                "reading them once"
+            )
 
 
 if __name__ == "__main__":

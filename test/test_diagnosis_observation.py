@@ -47,6 +47,22 @@ def test_a_steady_rotor_turns_evenly_to_both_ends(phase: float, rate: float) -> 
     np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
+@given(seed=st.integers(0, 2**31), slots=st.integers(1, 40))
+@settings(max_examples=30, deadline=None)
+def test_edges_are_a_slot_apart_unless_they_say_otherwise(seed: int, slots: int) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.integers(10_000_000, 90_000_000, 500))
+    # A few are written down in the wrong order.
+    swapped = np.arange(100, 500, 97)
+    time[swapped], time[swapped - 1] = time[swapped - 1], time[swapped]
+    rotor = STATION.instrument("cup").model_copy(update={"pulses_per_revolution": slots})
+    assert isinstance(rotor, Cup)
+    grid = Grid(0, 0.5, 60)
+    counted = rate_series(Pulses(time), rotor, grid)
+    told = rate_series(Pulses(time, np.arange(time.size) / slots), rotor, grid)
+    np.testing.assert_allclose(counted, told, rtol=1e-9, atol=1e-9)
+
+
 def test_a_rotor_that_stops_stands() -> None:
     cup = STATION.instrument("cup")
     assert isinstance(cup, Cup)

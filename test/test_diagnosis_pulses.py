@@ -8,12 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from diagnosis_cases import STATION, baseline, recorded
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wind_sensors.diagnosis.comparing.observation import Grid
 from wind_sensors.diagnosis.comparing.observing import BANDS
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
     INTERVALS,
+    _is_usual_longer,
     chance_of_intervals,
     interval_statistics,
     slot_intervals,
@@ -87,6 +90,16 @@ def test_slots_are_followed_past_lost_and_doubled_edges(
         # A wrong count anywhere spreads every slot over all of them, and next to nothing is left.
         right += found == pytest.approx(expected, abs=0.15 * max(expected))
     assert right >= followed * records
+
+
+@given(
+    intervals=st.lists(st.sampled_from([0.1, 0.4, 0.5, 1.0, 1.1, 3.0]), min_size=2, max_size=40),
+    limit=st.sampled_from([0.05, 0.45, 0.75, 1.05, 2.0, 5.0]),
+)
+def test_the_median_lies_on_the_side_of_most(intervals: list[float], limit: float) -> None:
+    time = np.cumsum([0.0, *intervals])
+    longer = _is_usual_longer(time, 0, time.size - 1, limit)
+    assert longer == (np.median(intervals) > limit)
 
 
 def test_of_very_many_edges_some_tell_as_much_as_all() -> None:

@@ -15,12 +15,10 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Naming,
-    no_terms,
 )
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.moves import merged
 from wind_sensors.diagnosis.explaining.naming import (
-    kept_if_better,
     name,
     named_alone,
     named_instead,
@@ -127,7 +125,11 @@ def test_the_same_effect_at_other_times_is_no_other_explanation(
     placebos: list[Sequence[Term]] = []
 
     def kept(
-        whitener: Whitener, station: Station, terms: Sequence[Term], placebo: Sequence[Term]
+        whitener: Whitener,
+        station: Station,
+        terms: Sequence[Term],
+        placebo: Sequence[Term],
+        workers: int,
     ) -> None:
         placebos.append(placebo)
 
@@ -167,23 +169,6 @@ def test_a_pair_can_be_judged_by_the_effect_that_led() -> None:
     assert [t.key for t in alone.fit.terms] == [t.key for t in pair.alone.terms]
     assert 0.0 < alone.gain < pair.gain
     assert named_alone(searcher, alone) is None
-
-
-def test_what_was_known_before_stays_if_it_fits_clearly_better() -> None:
-    slow = with_effect(STATION, catalogue()["rotor_inertia"], "cup", {"inertia_factor": 3.0})
-    searcher = searcher_of(prepare(recorded(slow, 96)), baseline(), catalogue(), {})
-    heavy = Term(catalogue()["rotor_inertia"], "cup", {"inertia_factor": 3.0})
-    right, wrong = named(searcher, heavy), named(searcher, drift())
-    kept = kept_if_better(searcher, right, wrong)
-    assert [t.key for t in kept.fit.terms] == [heavy.key]
-    # Nor does what is no better come back.
-    assert kept_if_better(searcher, wrong, right) is right
-    assert kept_if_better(searcher, right, right) is right
-    # The second search may find nothing.
-    nothing = replace(right, fit=no_terms(right.whitener, searcher), gain=0.0)
-    kept = kept_if_better(searcher, right, nothing)
-    assert [t.key for t in kept.fit.terms] == [heavy.key]
-    assert kept_if_better(searcher, wrong, nothing) is nothing
 
 
 def _rivalled() -> tuple[Searcher, Naming]:

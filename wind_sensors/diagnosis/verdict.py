@@ -17,7 +17,6 @@ from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
 from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.naming import (
-    kept_if_better,
     name,
     named_alone,
     named_instead,
@@ -36,11 +35,11 @@ from wind_sensors.station.signals import Recording
 from wind_sensors.station.silence import Silent, silent_instruments
 
 TURNING_MISFIT = 0.1
-"""The search runs again without the seconds in which vanes turn round apart if these hold this
-share of a vane's misfit."""
+"""The seconds in which vanes turn round apart are left out if they hold this share of the misfit
+that the leading effect leaves of a vane."""
 
 OTHER_SPEED = 0.1
-"""It runs again, too, with the wind at the sensors that a named motion of the platform gives, if
+"""The search runs again with the wind at the sensors that a named motion of the platform gives, if
 that differs by this share: by the old one eddies have the wrong sizes."""
 
 

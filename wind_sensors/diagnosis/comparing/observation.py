@@ -109,42 +109,43 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
     time = grid.seconds(pulses.time)
     if time.size < 2:
         return np.zeros(grid.n)
-    if pulses.turns is not None:
-        turns = np.asarray(pulses.turns, dtype=np.float64)
-    else:
-        turns = np.arange(time.size, dtype=np.float64)
-        turns /= rotor.pulses_per_revolution
+    # Without angles each edge is one slot more: no array is needed to say so.
+    turns = np.empty(0) if pulses.turns is None else np.asarray(pulses.turns, dtype=np.float64)
     if np.any(time[1:] < time[:-1]):
         # Only few are out of order: stable sorts are quick then, the usual one is not.
-        order = np.argsort(time, kind="stable")
-        time, turns = time[order], np.sort(turns, kind="stable")
+        time, turns = np.sort(time, kind="stable"), np.sort(turns, kind="stable")
     slots = min(rotor.pulses_per_revolution, time.size - 1)
-    at = _turns_at(grid.edges, time, turns, slots)
+    at = _turns_at(grid.edges, time, turns, 1.0 / rotor.pulses_per_revolution, slots)
     return np.asarray(
         np.diff(at) * (2.0 * np.pi * rotor.calibration_distance / grid.dt), dtype=np.float64
     )
 
 
 @compiled
-def _turns_at(at: FloatArray, time: FloatArray, turns: FloatArray, slots: int) -> FloatArray:
+def _turns_at(
+    at: FloatArray, time: FloatArray, turns: FloatArray, turns_each: float, slots: int
+) -> FloatArray:
     """Turns at given times, between the means over so many successive edges.
 
     Straight on for two edges beyond the first and the last; constant from there on.
 
     Args:
         at: Ascending, shape (n,).
-        time, turns: Of the edges, ascending, shape (m,), m > slots.
+        time: Of the edges, ascending, shape (m,), m > slots.
+        turns: At the edges, ascending, shape (m,); empty: `turns_each` at each.
+        turns_each: From one edge to the next.
         slots: Number of edges that are averaged.
     """
+    even = turns.size == 0
     beyond = 0.5 * (slots - 1) + 2.0
     points = time.size - slots + 1
-    time_sum, turns_sum = 0.0, 0.0
-    for k in range(slots):
-        time_sum += time[k]
-        turns_sum += turns[k]
-    x_1, y_1 = time_sum / slots, turns_sum / slots
-    x_0 = x_1 - beyond * (time[slots] - time[0]) / slots
-    y_0 = y_1 - beyond * (turns[slots] - turns[0]) / slots
+    time_sum = float(np.sum(time[:slots]))
+    turns_sum = turns_each * 0.5 * slots * (slots - 1) if even else float(np.sum(turns[:slots]))
+    turns_step = turns_each * slots if even else turns[slots] - turns[0]
+    per_slot = 1.0 / slots
+    x_1, y_1 = time_sum * per_slot, turns_sum * per_slot
+    x_0 = x_1 - beyond * (time[slots] - time[0]) * per_slot
+    y_0 = y_1 - beyond * turns_step * per_slot
     point = 0
     out = np.empty(at.size)
     for i in range(at.size):
@@ -153,8 +154,10 @@ def _turns_at(at: FloatArray, time: FloatArray, turns: FloatArray, slots: int) -
             if point < points:
                 x_0, y_0 = x_1, y_1
                 time_sum += time[point + slots - 1] - time[point - 1]
-                turns_sum += turns[point + slots - 1] - turns[point - 1]
-                x_1, y_1 = time_sum / slots, turns_sum / slots
+                if not even:
+                    turns_step = turns[point + slots - 1] - turns[point - 1]
+                turns_sum += turns_step
+                x_1, y_1 = time_sum * per_slot, turns_sum * per_slot
             else:
                 time_step, turns_step = x_1 - x_0, y_1 - y_0
                 x_0, y_0 = x_1, y_1

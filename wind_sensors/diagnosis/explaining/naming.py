@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from wind_sensors.diagnosis.explaining.acceptance import ACCEPTED_GAIN, all_plausible
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
@@ -95,27 +94,6 @@ def name(
         return found
     enough = NARROW_SHARE * _gain_beside(searcher, found, narrow)
     return narrow if _gain_beside(searcher, narrow, found) > enough else found
-
-
-def kept_if_better(searcher: Searcher, known: Naming, found: Naming) -> Naming:
-    """What was found, or what was known before if it fits clearly better.
-
-    Args:
-        searcher: The search that found the former.
-        known: An explanation of the same recording, of which other parts counted.
-        found: What was found.
-    """
-    if {t.key for t in known.fit.terms} == {t.key for t in found.fit.terms}:
-        return found
-    null = found.whitener
-    again = fit(null, searcher.station, known.fit.terms, searcher.bank.without)
-    best, other = judged(searcher, [again, found.fit])
-    wins = [t.key for t in best.fit.terms] == [t.key for t in known.fit.terms]
-    if not wins or best.evidence > other.evidence - CLEARLY_BETTER or not all_plausible(best.fit):
-        return found
-    settled = _settled(searcher, best.fit, found.alternatives, found.screened)
-    # In its own noise a flexible effect gains what it has fitted away.
-    return replace(settled, alone=found.alone) if settled.gain > ACCEPTED_GAIN else found
 
 
 def named_alone(searcher: Searcher, naming: Naming) -> Naming | None:

@@ -190,6 +190,7 @@ def findings_of(
     bank: RegionBank,
     baseline: Baseline,
     with_proof: bool,
+    workers: int = 1,
 ) -> tuple[Finding, ...]:
     """Findings of a naming.
 
@@ -200,6 +201,7 @@ def findings_of(
         bank: Regions.
         baseline: What is normal.
         with_proof: Fit and score held-out blocks.
+        workers: Processes.
     """
     whitener = naming.whitener
     estimates = estimates_of(naming.fit)
@@ -213,7 +215,9 @@ def findings_of(
     # The same effects at other times are no other explanation.
     placebo = next((terms for terms in others if {t.key for t in terms} != named), ())
     proof = (
-        prove(whitener, baseline.station, naming.fit.terms, placebo) if with_proof else None
+        prove(whitener, baseline.station, naming.fit.terms, placebo, workers=workers)
+        if with_proof
+        else None
     )
     misfit = float(naming.nothing @ naming.nothing)
     out = []

@@ -157,9 +157,9 @@ def judgement_of(
     if calm and verdict != "none" and need_calibration(naming.fit.terms):
         verdict = "inconclusive"
     report("proving")(0.2)
-    findings = findings_of(naming, equal, before, bank, baseline, with_proof) if verdict in {
-        "named", "ambiguous"
-    } else ()  # fmt: skip
+    findings = findings_of(
+        naming, equal, before, bank, baseline, with_proof, workers
+    ) if verdict in {"named", "ambiguous"} else ()  # fmt: skip
     report("proving")(1.0)
     structured = located(naming, bank, comparison, baseline).is_structure
     upheld = _upheld(

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import spectra
+from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.explaining.terms import Term, planted, simulated_with
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving.held_out import (
@@ -87,6 +88,7 @@ def prove(
     terms: Sequence[Term],
     placebo: Sequence[Term] = (),
     seed: int = 1,
+    workers: int = 1,
 ) -> Proof:
     """Fit on every other block, score on the rest, and the other way round.
 
@@ -96,12 +98,18 @@ def prove(
         terms: The named effects with their fitted values.
         placebo: The next-best explanation.
         seed: Of the block bootstrap.
+        workers: Processes.
     """
     blocks = blocks_for([_acting(whitener, station, terms, term) for term in terms])
     masks = block_masks(whitener.comparison, blocks)
     even, odd = (side_of(whitener, station, mask, blocks) for mask in masks)
     ways = ((even, odd), (odd, even))
-    folds = [fold_of(fitting, scoring, station, terms) for fitting, scoring in ways]
+    competing = [terms, placebo] if placebo else [terms]
+    jobs = [(*way, each) for each in competing for way in ways]
+    found: list[Fold] = in_parallel(
+        lambda job: fold_of(job[0], job[1], station, job[2]), jobs, workers
+    )
+    folds, rivals = found[: len(ways)], found[len(ways) :]
     own = _reached(whitener, terms)
     rng = np.random.default_rng(seed)
     drawn = [
@@ -109,7 +117,6 @@ def prove(
         for _ in range(DRAWS)
     ]
     low, high = np.quantile(drawn, (0.025, 0.975))
-    rivals = [fold_of(*way, station, placebo) for way in ways] if placebo else []
     parameters = sum(term.fits(p) for term in terms for p in term.effect.parameters)
     smooth = [_curve(*way, parameters) for way in ways]
     size = sum(fold.vector.size for fold in folds)
