@@ -172,17 +172,28 @@ def test_a_series_of_harmonics_must_leave_nothing(effect: str, p: float, verdict
     assert verdict_of(naming, [], little, {}, 0.002, Excess()) == verdict
 
 
+CERTAIN = (("calibration_drift", "cup"), ("vane_offset", "vane"))
+UNCERTAIN = (("bearing_friction", "cup"), ("vane_damping", "vane"))
+
+
 @pytest.mark.parametrize(
     ("effects", "share", "verdict"),
-    [(1, 0.05, "unknown"), (2, 0.05, "named"), (1, 0.01, "named"), (2, 0.08, "unknown")],
+    [
+        (UNCERTAIN[:1], 0.05, "unknown"),
+        (UNCERTAIN, 0.05, "named"),
+        (UNCERTAIN[:1], 0.01, "named"),
+        (UNCERTAIN, 0.08, "unknown"),
+        (CERTAIN, 0.05, "unknown"),
+        (CERTAIN, 0.01, "named"),
+    ],
 )
 def test_two_effects_each_in_its_own_form_may_leave_more_than_one(
-    effects: int, share: float, verdict: Verdict
+    effects: tuple[tuple[str, str], ...], share: float, verdict: Verdict
 ) -> None:
     searcher, null = searched("calibration_drift", "cup", {"gain": 0.9})
-    drift = Term(catalogue()["calibration_drift"], "cup", {"gain": 0.9})
-    turn = Term(catalogue()["vane_offset"], "vane", {"offset": 5.0})
-    fitted = fit(null, STATION, [drift, turn][:effects], searcher.bank.without, iterations=0)
+    known = catalogue()
+    terms = [Term(known[name], where, dict(known[name].templates[0])) for name, where in effects]
+    fitted = fit(null, STATION, terms, searcher.bank.without, iterations=0)
     naming = Naming(fitted, null, null, null.of(searcher.bank.without), 2000.0)
     left = Remainder(score=1.5, p=0.002, share=share)
     assert verdict_of(naming, [], left, {}, 0.002, Excess()) == verdict

@@ -114,6 +114,7 @@ class Effect:
         form_error: Standard error of a size, relative to it, that the simulation's form leaves.
         noisy: What it does is drawn at random or hangs on the last digit (whether a vane sticks
             or slips), so that its simulation adds noise of its own.
+        even: Most of what it does is the same for either sign, so that fits begin at both.
         sticks: From the values, whether it holds and lets go: when it does so hangs on the last
             digit, so that it leaves noise of its own as what is `noisy` does.
         unmistakable: The signals that tell its values tell that it is this effect, too. Silence
@@ -154,6 +155,7 @@ class Effect:
     exact: bool = False
     form_error: float = 0.025
     noisy: bool = False
+    even: bool = False
     sticks: Callable[[Values], bool] | None = None
     unmistakable: bool = False
     stirs: bool = False
@@ -185,8 +187,15 @@ class Effect:
             values: Departures from health in proportion to those of the templates.
             drive: What drives the recording.
         """
-        tied = any(p.tied is not None and not p.is_free(drive) for p in self.parameters)
-        return self.tie(values) if tied and self.tie is not None else dict(values)
+        return self.tie(values) if self.tie is not None and self.is_tied(drive) else dict(values)
+
+    def is_tied(self, drive: Drive) -> bool:
+        """Whether a parameter is held at a value of its own, for only products are seen.
+
+        Args:
+            drive: What drives the recording.
+        """
+        return any(p.tied is not None and not p.is_free(drive) for p in self.parameters)
 
     def scaled(self, values: Values, factor: float) -> dict[str, float]:
         """Values with their departure from health multiplied, within their bounds."""
@@ -196,6 +205,15 @@ class Effect:
                 moved = p.healthy + factor * (values[p.name] - p.healthy)
                 out[p.name] = min(max(moved, p.low), p.high)
         return out
+
+    def either_sign(self, values: Values) -> list[dict[str, float]]:
+        """Values, and those with the opposite departure from health where that does much the same.
+
+        Args:
+            values: Parameters.
+        """
+        same = dict(values)
+        return [same, self.scaled(values, -1.0)] if self.even else [same]
 
     @property
     def is_quick(self) -> bool:

@@ -149,6 +149,7 @@ AXIS_TILT = Effect(
     ),
     update=_tilt,
     everywhere=True,
+    even=True,
     templates=({"tilt_x": 3.0, "tilt_y": 0.0}, {"tilt_x": 0.0, "tilt_y": 3.0}),
     confusable={
         "flow_distortion": "a spirit level on the mount",

@@ -55,9 +55,8 @@ def smallest_detectable(searcher: Searcher, whitener: Whitener) -> dict[str, Det
         if not moved:
             continue
         parameter = moved[0]
-        healthy = parameter.healthy or 0.0
-        value = amplitude * abs(template.values[parameter.name] - healthy)
-        relative = value / parameter.minimum
+        relative = amplitude * effect.relative_size(template.values)
+        value = relative * parameter.minimum
         if effect_name not in out or relative < out[effect_name].relative:
             size = SmallestSize(value, parameter.unit, " or ".join(equals_of(effect, parameter)))
             out[effect_name] = Detectable(size, relative)

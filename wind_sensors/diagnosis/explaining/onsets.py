@@ -156,7 +156,7 @@ def window_starts(
             *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)
         )
         interval = interval_of(searcher.comparison, *span.window)
-        starts = [Term(effect, key[1], starting_values(score), interval)]
+        starts = [Term(effect, key[1], starting_values(score, searcher.comparison.drive), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
         if key not in found or span.net > found[key][0]:
             found[key] = (span.net, starts)

@@ -200,11 +200,12 @@ def _further_fits(
     for term in (*(single.terms[0] for single in large), *hidden):
         if not eligible([term]):
             continue
-        if term.key in known:
-            known[term.key].append(term)
-        else:
-            known[term.key] = [term]
+        if term.key not in known:
+            known[term.key] = []
             candidates.append(known[term.key])
+        known[term.key] += [
+            replace(term, values=values) for values in term.effect.either_sign(term.values)
+        ]
     return searcher.fit_all(whitener, current, [*candidates, *windowed])
 
 

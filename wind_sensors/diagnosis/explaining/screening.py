@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.explaining.signatures import Template
+from wind_sensors.simulation.drive import Drive
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -117,8 +118,13 @@ def is_possible(score: Score) -> bool:
     return score.template.effect.relative_size(starting_values(score)) > 0.0
 
 
-def starting_values(score: Score) -> dict[str, float]:
-    """Parameters at which a nonlinear fit of a scored effect begins."""
+def starting_values(score: Score, drive: Drive | None = None) -> dict[str, float]:
+    """Parameters at which a nonlinear fit of a scored effect begins.
+
+    Args:
+        score: Of the effect.
+        drive: What drives the recording; None: in proportion to the effect's templates.
+    """
     effect = score.template.effect
     values = {p.name: (0.0 if p.healthy is None else p.healthy) for p in effect.parameters}
     for parameter in effect.parameters:
@@ -133,6 +139,8 @@ def starting_values(score: Score) -> dict[str, float]:
             if parameter.healthy is not None and parameter.graded:
                 departure = template[parameter.name] - parameter.healthy
                 values[parameter.name] += amplitude * departure
+    if drive is not None:
+        values = effect.begun(values, drive)
     for parameter in effect.parameters:
         values[parameter.name] = float(
             np.clip(values[parameter.name], parameter.low, parameter.high)

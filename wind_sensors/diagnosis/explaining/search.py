@@ -194,8 +194,10 @@ class Searcher:
         worth = max(LEAST_GAIN, LEAST_SHARE * scores[0].gain) if scores else 0.0
         for score in [s for s in scores[:number] if s.gain > worth and self._may_be(s)]:
             effect = self.effects[score.effect]
-            start = effect.begun(starting_values(score), drive)
-            starts = [Term(effect, score.instrument, start)]
+            start = starting_values(score, drive)
+            starts = [
+                Term(effect, score.instrument, values) for values in effect.either_sign(start)
+            ]
             for parameter in (p for p in effect.parameters if p.is_free(drive)):
                 starts.extend(
                     Term(effect, score.instrument, {**start, parameter.name: value})

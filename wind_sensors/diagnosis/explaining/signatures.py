@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.effects.definition import (
     touched,
     with_effect,
 )
+from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -123,14 +124,25 @@ def templates_of(
     return out
 
 
-def _larger_templates(templates: Iterable[Template]) -> list[Template]:
+def _larger_templates(templates: Iterable[Template], drive: Drive) -> list[Template]:
     """Larger sizes of the effects that have one template and whose bounds allow them.
 
-    Not of delays: what a boat's sway or a gust shows four times as late is another signal.
+    Not of delays: what a boat's sway or a gust shows four times as late is another signal. Where
+    only products of an effect's values are seen, with those from which its fits start: at rest an
+    imbalance of the template's size shows less than the lean that it needs.
+
+    Args:
+        templates: Of the catalogue.
+        drive: What drives the recording.
     """
     out = []
     for template in templates:
         effect = template.effect
+        if effect.is_tied(drive):
+            departures = {name: LARGER[0] * value for name, value in template.values.items()}
+            values = effect.begun(departures, drive)
+            out.append(replace(template, values=values, multiple=LARGER[0]))
+            continue
         if len(effect.templates) > 1 or effect.entrance == "clock":
             continue
         for multiple in LARGER:
@@ -238,7 +250,9 @@ def with_larger(
     bank: SignatureBank, comparison: Comparison, station: Station, workers: int = 1
 ) -> SignatureBank:
     """A bank with larger sizes of its effects, as far as they can be simulated."""
-    return _with_more(bank, comparison, station, _larger_templates(bank.templates), workers)
+    return _with_more(
+        bank, comparison, station, _larger_templates(bank.templates, comparison.drive), workers
+    )
 
 
 def _with_more(

@@ -52,7 +52,7 @@ LEAST_REMAINDER = 0.006
 """A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
 times its share of what there was to explain is more than the second, and that share more than the
 third: of a large effect the form may leave more, and of two four times as much, each with its own
-and with what it makes of the other's."""
+and with what it makes of the other's. Where the forms are certain two leave no more than one."""
 
 REMAINDER_P = 0.05
 """Nor does a remainder count that a healthy day shows with more probability."""
@@ -275,7 +275,8 @@ def verdict_of(
     asked_for = located_p <= REMAINDER_P or naming.gain > certain
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
-    product = REMAINDER_SHARE * len(naming.fit.terms) ** 2
+    forms = sum(not term.effect.exact for term in naming.fit.terms)
+    product = REMAINDER_SHARE * max(forms, 1) ** 2
     sizeable = share > max(product / max(remainder.score, 1e-9), LEAST_REMAINDER)
     bent = any(len(term.effect.parameters) >= FREELY_BENT for term in naming.fit.terms)
     counts = (p < REMAINDER_P and sizeable) or (p < BENT_REMAINDER_P and bent)
