@@ -116,7 +116,7 @@ def swing(
     cosine = math.cos(nose)
     sine = math.sin(nose)
     torque -= tracks.imbalance[i] * (cosine * tracks.gravity_y[i] - sine * tracks.gravity_x[i])
-    torque -= tracks.spring[i] * math.sin(nose - tracks.spring_heading[i])
+    torque -= tracks.spring[i] * (nose - tracks.spring_heading[i])
     if geometry.propeller_drag > 0.0:
         # The tunnel measured the vane with its propeller where it is: a drawing that errs does not
         # change how the vane swings.

@@ -115,7 +115,7 @@ def water_film(scene: Scene, amount: float, activity: Array) -> Parameters:
 
 
 def winding_cable(scene: Scene, amount: float, activity: Array) -> Parameters:
-    """A cable that pulls the vane towards one heading."""
+    """A cable that winds up as the vane turns: it pulls the more, the farther from its rest."""
     heading = float(scene.rng.uniform(-np.pi, np.pi))
     scene.vane.spring[:] += activity * stiffness(scene, 5.0) * float(np.radians(2.0 * amount))
     scene.vane.spring_heading[:] = heading

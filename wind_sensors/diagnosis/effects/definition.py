@@ -114,6 +114,8 @@ class Effect:
         form_error: Standard error of a size, relative to it, that the simulation's form leaves.
         noisy: What it does is drawn at random or hangs on the last digit (whether a vane sticks
             or slips), so that its simulation adds noise of its own.
+        own_days: What a healthy day promises of it has reasons of its own, and is no measure of
+            other effects.
         even: Most of what it does is the same for either sign, so that fits begin at both.
         sticks: From the values, whether it holds and lets go: when it does so hangs on the last
             digit, so that it leaves noise of its own as what is `noisy` does.
@@ -155,6 +157,7 @@ class Effect:
     exact: bool = False
     form_error: float = 0.025
     noisy: bool = False
+    own_days: bool = False
     even: bool = False
     sticks: Callable[[Values], bool] | None = None
     unmistakable: bool = False

@@ -171,6 +171,7 @@ VANE_IMBALANCE = Effect(
     source="derived: pendulum term of a vane on a leaning axis",
     region="low speeds, on a mount that leans or accelerates",
     occasional=True,
+    own_days=True,
     parameters=(
         Parameter(
             "imbalance", "1/m", -MOST_IMBALANCE, MOST_IMBALANCE, minimum=SMALLEST_IMBALANCE,

@@ -118,7 +118,7 @@ def needed_gain(current: Fit, further: Term, baseline: Baseline) -> float:
         baseline: Knows how loud healthy days are.
     """
     least = ACCEPTED_ELSEWHERE_GAIN if current.terms else ACCEPTED_GAIN
-    loudness = baseline.loudness(further.instrument, further.effect.is_quick)
+    loudness = baseline.loudness(further.instrument, further.effect)
     return max(least, LOUDEST_FACTOR * loudness)
 
 

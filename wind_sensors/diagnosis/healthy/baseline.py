@@ -14,6 +14,8 @@ from wind_sensors.diagnosis.comparing import activity
 from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, Channel, channels_of
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import ERRATIC, STEPS
 from wind_sensors.diagnosis.comparing.reference_place import Place
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.station.model import Angle, AnyInstrument, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -149,11 +151,10 @@ class Baseline:
         means: Amplitude of each template shared by the healthy recordings, by
             `effect|instrument|template number`, in units of the template.
         standing: Scatter of each template's amplitude between them.
-        loudest: Largest drop of the cost, beyond its parameters, that an effect of an instrument
-            (or of the `station`, the `platform`) promises in one healthy recording judged by the
-            others; calm ones aside.
+        loudest: Largest drop of the cost, beyond its parameters, that an effect promises in one
+            healthy recording judged by the others, by `effect|instrument` (or `station`,
+            `platform`; the instrument alone: of any effect); calm recordings aside.
         loudest_in_calm: The same, calm ones among them.
-        loudest_quick, loudest_quick_in_calm: The same of effects that only damp, hasten or delay.
         liveliness: Standard deviation of the slowest change, over a recording, of the power of
             quick eddies (its logarithm) that all channels share.
         usual_wind: Wind speed [m/s] that healthy recordings exceed nearly all the time.
@@ -168,8 +169,6 @@ class Baseline:
     standing: Mapping[str, float] = field(default_factory=dict)
     loudest: Mapping[str, float] = field(default_factory=dict)
     loudest_in_calm: Mapping[str, float] = field(default_factory=dict)
-    loudest_quick: Mapping[str, float] = field(default_factory=dict)
-    loudest_quick_in_calm: Mapping[str, float] = field(default_factory=dict)
     liveliness: float = activity.USUAL_LIVELINESS
     usual_wind: float = np.inf
     place: Place | None = None
@@ -179,26 +178,26 @@ class Baseline:
         """Whether healthy recordings stand behind it."""
         return bool(self.recordings)
 
-    def loudness(self, instrument: str, quick: bool = False) -> float:
-        """What an effect of an instrument promises on the loudest healthy day.
+    def loudness(self, instrument: str, effect: Effect | None = None) -> float:
+        """What the loudest healthy day promises that an effect could be taken for.
 
         A few days show little of each instrument: what they show of others stands in, in part.
 
         Args:
             instrument: Name, or `station`, or `platform`.
-            quick: Of an effect that only damps, hastens or delays: a vane that reads half a degree
-                more on one day and less on another does not look like one that is filtered.
+            effect: What would be named; None: anything.
         """
-        loudest = self.loudest_quick if quick else self.loudest
         elsewhere = min(1.0, FEW_DAYS / max(len(self.recordings), 1))
-        overall = max(loudest.values(), default=0.0)
-        return max(loudest.get(instrument, 0.0), elsewhere * overall)
+        loudest = 0.0
+        for key, gain in self.loudest.items():
+            name, _, where = key.rpartition("|")
+            if _is_measure_of(name, effect):
+                loudest = max(loudest, gain if where == instrument else elsewhere * gain)
+        return loudest
 
     def in_calm(self) -> Baseline:
         """The same baseline for a recording of a calm day."""
-        return replace(
-            self, loudest=self.loudest_in_calm, loudest_quick=self.loudest_quick_in_calm
-        )
+        return replace(self, loudest=self.loudest_in_calm)
 
     def for_station(self, station: Station) -> Baseline:
         """The same baseline for a recording whose station file may say otherwise.
@@ -241,8 +240,6 @@ class Baseline:
             "standing": dict(self.standing),
             "loudest": dict(self.loudest),
             "loudest_in_calm": dict(self.loudest_in_calm),
-            "loudest_quick": dict(self.loudest_quick),
-            "loudest_quick_in_calm": dict(self.loudest_quick_in_calm),
             "liveliness": self.liveliness,
             "usual_wind": _listed(np.array([self.usual_wind]))[0],
             "place": None if self.place is None else asdict(self.place),
@@ -258,7 +255,6 @@ class Baseline:
         """
         content = json.loads(text)
         try:
-            in_calm = content.get("loudest_in_calm", content["loudest"])
             known = Baseline(
                 recordings=tuple(content["recordings"]),
                 original=Station.model_validate(content["original"]),
@@ -270,9 +266,7 @@ class Baseline:
                 means=content["means"],
                 standing=content["standing"],
                 loudest=content["loudest"],
-                loudest_in_calm=in_calm,
-                loudest_quick=content.get("loudest_quick", content["loudest"]),
-                loudest_quick_in_calm=content.get("loudest_quick_in_calm", in_calm),
+                loudest_in_calm=content.get("loudest_in_calm", content["loudest"]),
                 liveliness=content.get("liveliness", activity.USUAL_LIVELINESS),
                 usual_wind=float(_unlisted([content["usual_wind"]])[0]),
                 place=None if content.get("place") is None else Place(**content["place"]),
@@ -284,6 +278,25 @@ class Baseline:
             if kept and kept.statistics_mean.size != station_deviation(channel).size:
                 raise ValueError(f"not a baseline: other statistics of {channel.name}")
         return known
+
+
+def _is_measure_of(name: str, effect: Effect | None) -> bool:
+    """Whether what a healthy day promises of one effect tells what another one must bring.
+
+    A vane that reads half a degree more on one day and less on another does not look like one that
+    is filtered; the wind's way to the reference, which looks like a delay, not like one that
+    is out of balance.
+
+    Args:
+        name: Of the effect that the day promises; empty: of any.
+        effect: What would be named; None: anything.
+    """
+    promised = catalogue().get(name)
+    if promised is None or (effect is not None and effect.name == name):
+        return True
+    if promised.own_days:
+        return False
+    return effect is None or promised.is_quick or not effect.is_quick
 
 
 def _listed(values: FloatArray) -> list[float | None]:

@@ -330,8 +330,6 @@ def learn(
         usual_wind=float(np.quantile(speeds, SELDOM)),
         loudest=loudest_gains(rows, [is_calm(c) for c in comparisons]),
         loudest_in_calm=loudest_gains(rows),
-        loudest_quick=loudest_gains(rows, [is_calm(c) for c in comparisons], quick=True),
-        loudest_quick_in_calm=loudest_gains(rows, quick=True),
         recordings=tuple(r.name for r in recordings),
         means=means,
         standing=standing_sizes(rows, means),

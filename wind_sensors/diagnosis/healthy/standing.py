@@ -167,19 +167,18 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
 
 
 def loudest_gains(
-    rows: Sequence[Evidence], calm: Sequence[bool] | None = None, quick: bool = False
+    rows: Sequence[Evidence], calm: Sequence[bool] | None = None
 ) -> dict[str, float]:
-    """Largest gains that effects promise in a healthy recording judged by the others.
+    """Largest gain that each effect promises in a healthy recording judged by the others.
 
     Args:
         rows: Of each healthy recording.
         calm: Which of them say nothing of a windy day; None, or too few others: none.
-        quick: Of effects that only damp, hasten or delay; a day's offset is none of these.
 
     Returns:
-        By instrument (or `station`, `platform`), drop of the cost beyond what the parameters cost;
-        nothing with fewer than three recordings. The wind's way from the reference is taken for
-        granted, as the search does.
+        By `effect|instrument` (or `station`, `platform`), drop of the cost beyond what the
+        parameters cost, where there is one; nothing with fewer than three recordings. The wind's
+        way from the reference is taken for granted, as the search does.
     """
     loudest: dict[str, float] = {}
     if len(rows) < FEWEST_DAYS:
@@ -201,10 +200,9 @@ def loudest_gains(
         gram = row.gram - part.T @ inner
         seen = seen - inner.T @ (usual @ seen[: len(own)])
         for score in filter(is_possible, scores_of(row.probes, gram, seen)):
-            if quick and not score.template.effect.is_quick:
-                continue
             parameters = len(score.template.effect.parameters)
             cost = PENALTY_PER_PARAMETER + PENALTY_PER_FURTHER_PARAMETER * (parameters - 1)
-            before = loudest.get(score.instrument, 0.0)
-            loudest[score.instrument] = max(before, score.gain - cost)
+            key = f"{score.effect}|{score.instrument}"
+            if score.gain - cost > loudest.get(key, 0.0):
+                loudest[key] = score.gain - cost
     return loudest
