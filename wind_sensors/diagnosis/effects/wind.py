@@ -141,8 +141,8 @@ AXIS_TILT = Effect(
     source="K94, eq. (2); K14, eqs. (83), (84)",
     region="with the vertical wind, opposite for wind from opposite sides",
     parameters=(
-        Parameter("tilt_x", "deg", -45.0, 45.0, minimum=3.0, step=0.5),
-        Parameter("tilt_y", "deg", -45.0, 45.0, minimum=3.0, step=0.5),
+        Parameter("tilt_x", "deg", -60.0, 60.0, minimum=3.0, step=0.5),
+        Parameter("tilt_y", "deg", -60.0, 60.0, minimum=3.0, step=0.5),
     ),
     applies=lambda entry, station: (
         isinstance(entry, Rotor | Angle) and not getattr(entry, "mounted_on", "")
