@@ -22,7 +22,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     no_terms,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit, fit
-from wind_sensors.diagnosis.explaining.moments import is_steady, single_event
+from wind_sensors.diagnosis.explaining.moments import is_late_again, is_steady, single_event
 from wind_sensors.diagnosis.explaining.onsets import in_a_part, refined_interval
 from wind_sensors.diagnosis.explaining.rounds import blind_starts, later_starts
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
@@ -103,6 +103,34 @@ def test_a_gust_is_taken_off_a_gain_but_not_that_one_moment_is_always_the_best(
 
     more = single_event(comparison, seen(misfit), seen(misfit - change))
     assert more == pytest.approx(gust if taken_off else 0.0, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "steadily", "again"),
+    [
+        ("timestamp_latency", {"latency": 0.4}, 0.0, False),
+        ("timestamp_latency", {"latency": 0.4}, 30.0, True),
+        ("clock_drift", {"drift": 900.0}, 4.0, False),
+        ("vane_damping", {"damping_factor": 3.0}, 0.0, True),
+    ],
+)
+def test_one_swing_of_the_wind_makes_no_clock_late(
+    searcher: Searcher, name: str, values: dict[str, float], steadily: float, again: bool
+) -> None:
+    comparison = searcher.comparison
+    nothing = no_terms(searcher.whitener(searcher.bank.without), searcher)
+    n = comparison.grid.n
+    swing = np.where(np.abs(np.arange(n) - 0.6 * n) < 0.01 * n, np.sqrt(60.0 / (0.02 * n)), 0.0)
+    misfit = np.hypot(swing, np.sqrt(steadily / n))
+    term = Term(catalogue()[name], "vane", values)
+
+    def seen(series: FloatArray) -> Fit:
+        vector = in_first_channel(comparison, series, nothing.vector.size)
+        return replace(nothing, terms=(term,), vector=vector, cost=float(vector @ vector))
+
+    before, after = seen(misfit), seen(np.zeros(n))
+    assert before.cost > 50.0
+    assert is_late_again(comparison, before, after) is again
 
 
 def test_where_another_effect_passes_one_that_the_screening_hardly_sees_is_tried_too(

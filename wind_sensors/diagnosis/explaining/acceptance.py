@@ -17,7 +17,12 @@ from wind_sensors.diagnosis.explaining.explanation import (
     total,
 )
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
-from wind_sensors.diagnosis.explaining.moments import is_its_moment, is_steady, single_event
+from wind_sensors.diagnosis.explaining.moments import (
+    is_its_moment,
+    is_late_again,
+    is_steady,
+    single_event,
+)
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
@@ -158,6 +163,8 @@ def brought(
         return -np.inf
     before = _before(searcher, candidate, current)
     if not is_steady(comparison, before, candidate.fit):
+        return -np.inf
+    if not is_late_again(comparison, before, candidate.fit):
         return -np.inf
     if too_small(searcher, candidate.fit, total(before)):
         return -np.inf

@@ -113,6 +113,27 @@ def squares_in_parts(comparison: Comparison, vector: FloatArray, width: int) -> 
     return squares
 
 
+DELAYED_AGAIN = 12.0
+"""What comes late does so in every gust: without its best moment a delay still brings so much. One
+swing of the wind may have taken another way to the reference, for minutes in a calm."""
+
+
+def is_late_again(comparison: Comparison, before: Fit, after: Fit) -> bool:
+    """Whether the newest term, if it is a delay, gains outside its best moment, too.
+
+    Args:
+        comparison: The recording.
+        before, after: Two explanations in the same null.
+    """
+    newest = after.terms[-1]
+    if newest.effect.entrance != "clock" or newest.is_told:
+        return True
+    gain = gain_in_parts(comparison, before, after, comparison.grid.n // MOMENTS)[:MOMENTS]
+    best = int(np.argmax(np.convolve(gain, np.ones(EVENT), "same")))
+    elsewhere = np.abs(np.arange(gain.size) - best) > EVENT // 2
+    return float(gain[elsewhere].sum()) >= DELAYED_AGAIN
+
+
 BY_CHANCE = 2.0
 """One moment is always the best: noise alone lets it bring so much more than the second best."""
 
