@@ -57,6 +57,7 @@ def recorded(
     mean: float = 7.0,
     swing: float = 0.0,
     described: Station = STATION,
+    seconds: float = SECONDS,
 ) -> Recording:
     """A recording of a station in a wind that its reference sees with errors.
 
@@ -66,9 +67,10 @@ def recorded(
         mean: Speed [m/s].
         swing: Amplitude of a turning to and fro every 45 s [rad].
         described: What the recording's station file says.
+        seconds: Length.
     """
     rng = np.random.default_rng(seed)
-    n = int(SECONDS / DT)
+    n = int(seconds / DT)
     speed = mean + _noise(rng, n, 60.0, 1.3) + _noise(rng, n, 3.0, 0.8)
     speed = np.maximum(speed, 0.5)
     turn = np.radians(20.0 * rng.standard_normal()) + _noise(rng, n, 80.0, 0.5)

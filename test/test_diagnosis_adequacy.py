@@ -258,6 +258,17 @@ def test_two_effects_must_stand_out_one_by_one(
     assert made_up(found, comparison, 100.0) is verdict
 
 
+@pytest.mark.parametrize(("parameters", "verdict"), [(1, False), (4, True)])
+def test_a_form_with_several_parameters_must_bring_more_where_nothing_stands_out(
+    parameters: int, verdict: bool
+) -> None:
+    known = catalogue()["wake_shadow"].parameters[:parameters]
+    estimates = {p.name: Estimate(1.0, 0.5, 1.5, p.unit) for p in known}
+    wake = replace(_finding("wake_shadow", "cup", 0.1, 0.998), gain=54.0, parameters=estimates)
+    turned = replace(_finding(*TURNED, 0.7, 0.002), gain=360.0)
+    assert made_up((turned, wake), prepare(recorded(STATION, 65)), 420.0) is verdict
+
+
 @pytest.mark.parametrize(
     ("noisy", "kind", "verdict"),
     [

@@ -205,10 +205,13 @@ def test_a_filter_takes_from_the_power_of_eddies_what_it_takes_from_the_course(
 ) -> None:
     values = {"time_constant": 1.0}
     filtered = with_effect(STATION, catalogue()["low_pass_filter"], "vane", values)
-    recording = replace(recorded(filtered, 72), station=STATION)
+    recording = replace(recorded(filtered, 72, seconds=800.0), station=STATION)
     seen = recording.angles["vane"]
     # Another day's eddies, of which the filter lets none through, in the place of those lost.
-    lost = recorded(STATION, 73).angles["vane"].angle - recorded(filtered, 73).angles["vane"].angle
+    lost = (
+        recorded(STATION, 73, seconds=800.0).angles["vane"].angle
+        - recorded(filtered, 73, seconds=800.0).angles["vane"].angle
+    )
     shown = np.angle(np.exp(1j * (seen.angle + (lost if made_good else 0.0))))
     recording = replace(recording, angles={"vane": Angles(seen.time, shown)})
     searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})

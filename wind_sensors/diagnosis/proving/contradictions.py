@@ -72,10 +72,13 @@ DISCORD = 10.0
 DISCORD_SHARE = 0.02
 """An effect that reaches several signals has one size on all of them: one of its own on each must
 not drop the cost by more than this, or than this share of the gain. A heavier rotor slows its own
-signal as thin air does, which would let the vane overshoot as well.
-The same of its course and the power of its eddies: of some thirty effects named rightly on
-concealed data, of which it is asked, none differs by more than 6.5; an imbalance that a sound
-vane's eddies on a boat in a lull asked for differed by 35."""
+signal as thin air does, which would let the vane overshoot as well."""
+
+IN_EDDIES = 22.0
+"""The same of its course and the power of its eddies: of some thirty effects named rightly on
+concealed data, of which it is asked, one differs by 15, an offset that an eddy-current brake made,
+and a filter beside a delay by 13, the others by 6.5 at most; an imbalance that a sound vane's
+eddies on a boat in a lull asked for differed by 35."""
 
 
 def undo_each_other(naming: Naming, station: Station) -> bool:
@@ -295,7 +298,7 @@ def is_otherwise_in_eddies(naming: Naming, station: Station) -> bool:
     """
     kind = naming.adequate.comparison.kind_of_each
     places = [kind == COURSE, np.isin(kind, OF_EDDIES)]
-    most = max(DISCORD, DISCORD_SHARE * naming.gain)
+    most = max(IN_EDDIES, DISCORD_SHARE * naming.gain)
     for term in naming.fit.terms:
         effect = term.effect
         own_way = effect.own_law or effect.entrance == "clock" or term.leaves_noise

@@ -6,6 +6,7 @@ import math
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.moments import needs_to_be_steady
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER
 from wind_sensors.diagnosis.explaining.terms import ALWAYS
 from wind_sensors.diagnosis.proving.findings import Finding
 
@@ -81,6 +82,8 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
         else:
             # What delays moves nothing up or down, and what moves it up delays nothing.
             least = SURE_GAIN
+        # A form with several parameters gains more by chance.
+        least += PENALTY_PER_FURTHER_PARAMETER * max(len(f.parameters) - 1, 0)
         if f.p > SHOWN_P and f.share < OWN_SHARE and f.gain <= least:
             return True
     delayed = any(f.term.effect.entrance == "clock" and f.gain > SURE_BESIDE_GAIN for f in own)
