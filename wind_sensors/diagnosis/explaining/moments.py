@@ -115,7 +115,7 @@ def squares_in_parts(comparison: Comparison, vector: FloatArray, width: int) -> 
 
 DELAYED_AGAIN = 12.0
 """What comes late does so in every gust: without its best moment a delay still brings so much. One
-swing of the wind may have taken another way to the reference, for minutes in a calm."""
+swing of the wind may have taken another way to the reference."""
 
 
 def is_late_again(comparison: Comparison, before: Fit, after: Fit) -> bool:
