@@ -37,7 +37,7 @@ from wind_sensors.diagnosis.explaining.leading import (
     leading_alone,
 )
 from wind_sensors.diagnosis.explaining.moments import is_its_moment
-from wind_sensors.diagnosis.explaining.screening import scores_of, starting_values
+from wind_sensors.diagnosis.explaining.screening import scores_of
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.signatures import LARGER
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
@@ -94,40 +94,6 @@ def test_a_larger_size_shows_what_the_scatter_of_few_pulses_hides() -> None:
     # Amplitudes stay in units of the effect's own template.
     estimate = gain["any"].amplitude * gain["any"].template.effect.templates[0]["offset"]
     assert estimate == pytest.approx(-0.4, rel=0.5)
-
-
-def test_an_imbalance_at_rest_is_screened_by_its_pull_not_by_the_lean_it_needs() -> None:
-    pull = {"imbalance": 6.0, "tilt_x": 2.4, "tilt_y": -1.2}
-    heavy = with_effect(STATION, catalogue()["vane_imbalance"], "vane", pull)
-    recording = replace(recorded(heavy, 71, mean=4.0, swing=0.8), station=STATION)
-    comparison = prepare(recording)
-    searcher = searcher_of(comparison, default_baseline(STATION), catalogue(), {})
-    null = searcher.whitener(searcher.bank.without)
-    key = ("vane_imbalance", "vane")
-    score = next(
-        s
-        for s in searcher.scores(null, null.of(searcher.bank.without))
-        if (s.effect, s.instrument) == key
-    )
-    assert score.gain > 100.0
-    assert starting_values(score, comparison.drive) == pytest.approx(pull, rel=0.3, abs=0.5)
-
-
-def test_fits_of_a_lean_begin_on_both_sides() -> None:
-    lean = {"tilt_x": 9.0, "tilt_y": 4.0}
-    leaning = with_effect(STATION, catalogue()["axis_tilt"], "station", lean)
-    recording = replace(recorded(leaning, 71, swing=0.8), station=STATION)
-    searcher = searcher_of(prepare(recording), default_baseline(STATION), catalogue(), {})
-    null = searcher.whitener(searcher.bank.without)
-    vector = null.of(searcher.bank.without)
-    starts = {
-        of_one[0].effect.name: of_one for of_one in searcher.single_candidates(null, vector, 20)
-    }
-    one, other = (np.array([t.values["tilt_x"], t.values["tilt_y"]]) for t in starts["axis_tilt"])
-    assert np.any(one != 0.0)
-    assert other == pytest.approx(-one)
-    offsets = {t.values["offset"] > 0.0 for t in starts.get("vane_offset", ())}
-    assert len(offsets) < 2
 
 
 def test_what_is_small_but_sure_keeps_its_name() -> None:
