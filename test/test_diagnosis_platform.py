@@ -16,7 +16,7 @@ from wind_sensors.diagnosis.healthy.learning import learn
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.estimation import process
 from wind_sensors.recordings.station_files import load_station
-from wind_sensors.simulation import Scenario, simulate
+from wind_sensors.simulation import Scenario, Trajectory, simulate
 from wind_sensors.simulation.trajectories import multirotor
 from wind_sensors.station.model import Downwash, Input, Reference, Station
 from wind_sensors.station.signals import Recording
@@ -100,6 +100,23 @@ def test_a_frame_that_leans_is_an_axis_that_leans(axis: str, frame: dict[str, fl
         moved = np.nanstd(series - straight[name])
         assert moved > 0.0
         assert np.nanstd(series - of_frame[name]) < 0.01 * moved
+
+
+def test_a_vane_that_circles_keeps_to_the_slow_wind_of_its_mount() -> None:
+    """At 2 m/s round and round in 8 m/s the apparent wind swings by asin(2/8) to either side of the
+    true one, however the nose points: a vane is never farther from the slow wind than that."""
+    circle = Trajectory("circle", speed=2.0, turn_seconds=60.0)
+    steady = isotropic_spec(8.0, 1e-3, 60.0, direction=0.4, seed=3)
+    recording = simulate(uav(), Scenario(steady, duration=300.0, trajectory=circle))
+    comparison = prepare(recording)
+    assert np.ptp(comparison.direction) == pytest.approx(10.0 * np.pi, rel=0.05)
+    for channel in comparison.channels:
+        if channel.kind == "vane_angle":
+            away = np.abs(comparison.measured.series[channel.name] / comparison.speed)
+            assert np.quantile(away, 0.99) < np.arcsin(2.0 / 8.0) + np.radians(3.0)
+            break
+    else:
+        pytest.fail("no vane")
 
 
 def test_a_log_that_dies_is_found_with_its_end() -> None:

@@ -51,6 +51,22 @@ def test_slope_is_the_power_of_the_coherence_that_the_errors_imply(
     assert np.mean(slopes) == pytest.approx(np.mean(powers), rel=0.03)
 
 
+def test_of_a_simulation_without_coherence_nothing_is_expected() -> None:
+    """Noise that a simulation adds where it knows nothing must not be held against it."""
+    wide = slice(200, None)
+    chance, known = [], []
+    for seed in range(20):
+        truth = _red(seed)
+        for kept, other in ((chance, _red(300 + seed)), (known, truth + 0.5 * _red(100 + seed))):
+            coherence = spectra.coherence_of(
+                spectra.to_cosine(truth), spectra.to_cosine(other), DT, N
+            )
+            exponent = np.full(coherence.frequency.size, 0.3)
+            kept.append(spectra.shrinkage(coherence, exponent, N)[wide])
+    assert np.mean(chance) < 0.02
+    assert np.mean(known) == pytest.approx(0.8**0.3, rel=0.02)
+
+
 @given(st.integers(1, 200_000))
 def test_quick_lengths_have_no_large_prime_factor_and_cost_little(n: int) -> None:
     length = spectra.quick_length(n)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
@@ -104,10 +105,11 @@ def prepare(
             "Check the topics in the station file with `wind info`.",
         )
     first = known.instrument(channels[0].instrument)
-    flow = WindAtSensors(believed, drive).flow(first).wind
+    felt = WindAtSensors(believed, drive).flow(first)
     if place is not None:
-        drive = delayed(drive, flow, place)
-        flow = WindAtSensors(believed, drive).flow(first).wind
+        drive = delayed(drive, felt.wind, place)
+        felt = WindAtSensors(believed, drive).flow(first)
+    flow = felt.wind
     at = np.arange(len(drive)) * drive.dt
     coming_from = np.unwrap(np.arctan2(-flow[:, 1], -flow[:, 0]))
     speed = np.hypot(flow[:, 0], flow[:, 1])
@@ -116,8 +118,12 @@ def prepare(
         width = min(int(seconds / drive.dt), values.size - 1) | 1
         return np.interp(grid.centres, at, uniform_filter1d(values, width, mode="mirror"))
 
-    x, y = slowly(flow[:, 0], DIRECTION_TIME), slowly(flow[:, 1], DIRECTION_TIME)
-    slow_direction = np.unwrap(np.arctan2(-y, -x))
+    # On a mount that turns the mean is that of a wind seen by a mount that does not.
+    heading = cumulative_trapezoid(felt.turning[:, 2], dx=drive.dt, initial=0.0)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    x = slowly(cosine * flow[:, 0] - sine * flow[:, 1], DIRECTION_TIME)
+    y = slowly(sine * flow[:, 0] + cosine * flow[:, 1], DIRECTION_TIME)
+    slow_direction = np.unwrap(np.arctan2(-y, -x)) - np.interp(grid.centres, at, heading)
     slow_speed = slowly(speed, SPEED_TIME)
     empty = Simulated({}, {}, {}, {}, counted_segments(grid, None))
     comparison = Comparison(

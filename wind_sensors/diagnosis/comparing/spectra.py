@@ -22,6 +22,13 @@ _FIRST_BAND = 6
 _CHI_SQUARE_MEDIAN = 0.4549
 _LEAST = 1e-12
 
+CHANCE_EVIDENCE = 9.0
+SHARP = 4.0
+WIDE_BAND = 50
+"""Twice the log-likelihood ratio that one band in 400 without coherence reaches, how sharply less
+counts as none, and from how many coefficients on: the slope would follow from chance, and whatever
+makes a simulated signal quieter there would seem to explain it better."""
+
 LEAST_USUAL = 0.1
 """Share of the noise above the slow coefficients that chance is not taken to make."""
 
@@ -182,13 +189,22 @@ def shrinkage(coherence: Coherence, exponent: FloatArray, n: int) -> FloatArray:
         n: Number of coefficients.
     """
     squared = np.maximum(coherence.squared, 1e-3)
+    slope = squared**exponent * _surely_coherent(coherence)
     # The slowest band decides about offsets and gains; there the wind's own changes are far
     # larger than any error of the reference.
-    slope = squared**exponent
     slope[0] = 1.0
     full = spread_over(slope, coherence.edges, n)
     full[0] = 1.0
     return full
+
+
+def _surely_coherent(coherence: Coherence) -> FloatArray:
+    """Between 0, where a wide band's coherence may be chance, and 1."""
+    raw = coherence.cross**2 / np.maximum(coherence.measured * coherence.simulated, 1e-300)
+    count = np.diff(coherence.edges)
+    evidence = -count * np.log1p(-np.minimum(raw, 1.0 - 1e-9))
+    sure = evidence**SHARP / (evidence**SHARP + CHANCE_EVIDENCE**SHARP)
+    return np.where(count < WIDE_BAND, 1.0, sure)
 
 
 def noise_variance(
