@@ -72,6 +72,26 @@ def test_a_rotor_that_stops_stands() -> None:
     assert np.all(found[27:] == 0.0)
 
 
+@pytest.mark.parametrize("late", [0.3, -0.3])
+def test_a_late_clock_leaves_no_calm_at_the_ends_of_a_record(late: float) -> None:
+    """A recorder that starts with the rotor turning never gets what a late clock stamps before."""
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    pulses = np.arange(0.0, 20.0, 0.02)
+    heard = pulses[(pulses >= late) & (pulses < 20.0 + late)]
+    found = rate_series(Pulses((heard * 1e9).astype(np.int64)), cup, Grid(0, 0.2, 100))
+    np.testing.assert_allclose(found, found[50], rtol=1e-5)
+
+
+def test_a_rotor_that_starts_late_stood_before() -> None:
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    time = (np.arange(2.0, 20.0, 0.02) * 1e9).astype(np.int64)
+    found = rate_series(Pulses(time), cup, Grid(0, 0.2, 100))
+    assert np.all(found[:9] == 0.0)
+    assert np.all(found[11:] > 0.0)
+
+
 @given(st.floats(-2.0, 2.0), st.floats(0.0, 4.0))
 def test_a_vane_that_turns_is_not_erratic(start: float, rate: float) -> None:
     turning = start + rate * np.arange(400) / 20.0

@@ -19,6 +19,10 @@ from wind_sensors.station.signals import Angles, Pulses, erratic
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
+UNHEARD = 1.0
+"""So long [s] at its ends a record may lack the pulses of a rotor that turns: a clock that is late
+stamps those of the first moments before it was there to hear them."""
+
 SERIES_INTERVAL = 0.2
 """Interval of the compared series [s]."""
 
@@ -104,7 +108,8 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
 
     Times and turns are averaged over a revolution of pulses, so that slots and cups that differ do
     not beat with the bins. In between the rotor is taken to turn evenly, and as fast before the
-    first and after the last for two pulses more; beyond that it stands.
+    first and after the last for two pulses more, or for `UNHEARD` at the ends of the record; beyond
+    that it stands.
     """
     time = grid.seconds(pulses.time)
     if time.size < 2:
@@ -127,7 +132,8 @@ def _turns_at(
 ) -> FloatArray:
     """Turns at given times, between the means over so many successive edges.
 
-    Straight on for two edges beyond the first and the last; constant from there on.
+    Straight on for two edges beyond the first and the last, and to the ends of the record if those
+    are near; constant from there on.
 
     Args:
         at: Ascending, shape (n,).
@@ -146,6 +152,9 @@ def _turns_at(
     x_1, y_1 = time_sum * per_slot, turns_sum * per_slot
     x_0 = x_1 - beyond * (time[slots] - time[0]) * per_slot
     y_0 = y_1 - beyond * turns_step * per_slot
+    if at[0] < x_0 < at[0] + UNHEARD:
+        y_0 -= (x_0 - at[0]) * (y_1 - y_0) / (x_1 - x_0)
+        x_0 = at[0]
     point = 0
     out = np.empty(at.size)
     for i in range(at.size):
@@ -163,6 +172,9 @@ def _turns_at(
                 x_0, y_0 = x_1, y_1
                 x_1 += beyond * time_step
                 y_1 += beyond * turns_step
+                if at[-1] - UNHEARD < x_1 < at[-1]:
+                    y_1 += (at[-1] - x_1) * turns_step / time_step
+                    x_1 = at[-1]
         if at[i] >= x_1:
             out[i] = y_1
         elif at[i] <= x_0:

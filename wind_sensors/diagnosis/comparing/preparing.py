@@ -119,7 +119,7 @@ def prepare(
         return np.interp(grid.centres, at, uniform_filter1d(values, width, mode="mirror"))
 
     # On a mount that turns the mean is that of a wind seen by a mount that does not.
-    heading = cumulative_trapezoid(felt.turning[:, 2], dx=drive.dt, initial=0.0)
+    heading = cumulative_trapezoid(felt.turning[:, 2], dx=drive.dt, initial=0)
     cosine, sine = np.cos(heading), np.sin(heading)
     x = slowly(cosine * flow[:, 0] - sine * flow[:, 1], DIRECTION_TIME)
     y = slowly(sine * flow[:, 0] + cosine * flow[:, 1], DIRECTION_TIME)
