@@ -51,9 +51,11 @@ def test_the_stages_of_a_growth_hold_as_much_of_it_as_time_would(
     assert staged == pytest.approx(grown, rel=1e-6)
 
 
-def test_what_does_not_grow_is_there_at_once() -> None:
-    assert not iced(0.0).changes
-    (change,) = iced(0.0, (50.0, None)).changes
+@pytest.mark.parametrize("constant", [0.0, 5.0])
+def test_what_does_not_grow_is_there_at_once(constant: float) -> None:
+    """Nor does what would have grown in a few seconds."""
+    assert not iced(constant).changes
+    (change,) = iced(constant, (50.0, None)).changes
     assert change.start == 50.0
     assert change.set["calibration_gain"] == pytest.approx(0.9)
 

@@ -223,6 +223,11 @@ class Effect:
         """Whether it only damps, hastens or delays what the wind does, and moves no mean."""
         return (self.smooths or self.entrance == "clock") and not self.shifts
 
+    def growth(self, values: Values) -> float:
+        """Time constant [s] with which it approaches its size, 0 where it has it at once."""
+        constant = values.get(self.grows, 0.0)
+        return constant if constant >= SHORTEST_GROWTH else 0.0
+
     def relative_size(self, values: Values) -> float:
         """Size of the effect in units of the smallest size worth reporting."""
         if self.size is not None:
@@ -278,6 +283,10 @@ def touched(station: Station, effect: Effect, instrument: str) -> tuple[str, ...
     return tuple(e.name for e in station.instruments if effect.applies(e, station))
 
 
+SHORTEST_GROWTH = 20.0
+"""What reaches its size within so few seconds was there before: ice takes minutes, and what a rotor
+does in a record's first moments hangs on the wind before it."""
+
 _STAGES = (0.0, 0.2, 0.45, 0.75, 1.15, 1.7, 2.6)
 """Times [time constants] at which what grows takes another size."""
 
@@ -310,7 +319,7 @@ def with_effect(
     What grows becomes several changes, whether or not it has an interval.
     """
     begin, end = (0.0, None) if interval is None else interval
-    growth = values.get(effect.grows, 0.0)
+    growth = effect.growth(values)
     changes: list[Change] = []
     for name in touched(station, effect, instrument):
         if growth > 0.0:

@@ -41,7 +41,7 @@ class Term:
     @property
     def grows(self) -> bool:
         """Whether it approaches its size while it holds."""
-        return self.values.get(self.effect.grows, 0.0) > 0.0
+        return self.effect.growth(self.values) > 0.0
 
     @property
     def relative_size(self) -> float:
