@@ -83,6 +83,18 @@ def test_a_late_clock_leaves_no_calm_at_the_ends_of_a_record(late: float) -> Non
     np.testing.assert_allclose(found, found[50], rtol=1e-5)
 
 
+def test_pulses_stamped_in_one_lot_at_the_ends_do_not_matter() -> None:
+    """A logger that writes down what came before with one stamp tells no rate."""
+    cup = STATION.instrument("cup")
+    assert isinstance(cup, Cup)
+    heard = np.arange(1.0, 19.0, 0.02)
+    lot = np.full(3 * cup.pulses_per_revolution, 1.0)
+    time = np.concatenate((0.5 * lot, heard, 19.5 * lot))
+    found = rate_series(Pulses((time * 1e9).astype(np.int64)), cup, Grid(0, 0.2, 100))
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(found[15:85], found[50], rtol=1e-5)
+
+
 def test_a_rotor_that_starts_late_stood_before() -> None:
     cup = STATION.instrument("cup")
     assert isinstance(cup, Cup)

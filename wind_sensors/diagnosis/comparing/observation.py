@@ -152,7 +152,7 @@ def _turns_at(
     x_1, y_1 = time_sum * per_slot, turns_sum * per_slot
     x_0 = x_1 - beyond * (time[slots] - time[0]) * per_slot
     y_0 = y_1 - beyond * turns_step * per_slot
-    if at[0] < x_0 < at[0] + UNHEARD:
+    if at[0] < x_0 < at[0] + UNHEARD and x_0 < x_1:
         y_0 -= (x_0 - at[0]) * (y_1 - y_0) / (x_1 - x_0)
         x_0 = at[0]
     point = 0
@@ -172,7 +172,7 @@ def _turns_at(
                 x_0, y_0 = x_1, y_1
                 x_1 += beyond * time_step
                 y_1 += beyond * turns_step
-                if at[-1] - UNHEARD < x_1 < at[-1]:
+                if at[-1] - UNHEARD < x_1 < at[-1] and time_step > 0.0:
                     y_1 += (at[-1] - x_1) * turns_step / time_step
                     x_1 = at[-1]
         if at[i] >= x_1:
