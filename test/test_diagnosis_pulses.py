@@ -169,10 +169,12 @@ DEAD = {"dead_time": 0.0075, "loss_probability": 0.0, "loss_growth": 0.0}
 
 
 def test_a_dead_time_is_read_off_beside_another_gain() -> None:
+    """In a quarter of an hour; seven minutes leave the gain to whatever turns with the wind."""
     lossy = with_effect(STATION, catalogue()["missed_pulses"], "cup", DEAD)
     station = with_effect(lossy, catalogue()["calibration_drift"], "cup", {"gain": 1.05})
-    found = diagnose(recorded(station, 82), baseline(), with_proof=False)
+    found = diagnose(recorded(station, 82, seconds=900.0), baseline(), with_proof=False)
     named = {f.term.effect.name: f.term.values for f in found.findings}
+    assert found.verdict == "named" and len(named) == 2
     assert named["missed_pulses"]["dead_time"] == pytest.approx(0.0075, rel=0.01)
     assert named["calibration_drift"]["gain"] == pytest.approx(1.05, abs=0.015)
 
