@@ -30,7 +30,8 @@ from wind_sensors.diagnosis.proving.contradictions import (
     varies,
 )
 from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
-from wind_sensors.station.signals import Angles
+from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.station.signals import Angles, Pulses
 
 
 def searched(
@@ -264,3 +265,24 @@ def test_what_holds_throughout_is_not_said_to_pass(planted: Interval) -> None:
     kept = held_throughout(searcher, Judged(one, null, evidence(one, null)), None)
     assert kept.fit.terms[0].interval == planted
     assert no_terms(null, searcher).cost > kept.fit.cost
+
+
+@pytest.mark.parametrize("bursts", [True, False])
+def test_a_radio_that_sends_beside_the_rotor_is_no_contact_that_bounces(bursts: bool) -> None:
+    recording = recorded(STATION, 74)
+    pulses = recording.pulses["cup"].time
+    if bursts:
+        sent = pulses[0] + np.arange(0, pulses[-1] - pulses[0], 60_000_000)
+        false = sent[(sent - sent[0]) % 20_000_000_000 < 3_000_000_000]
+    else:
+        chance = np.random.default_rng(3)
+        bounced = pulses[chance.random(pulses.size) < 0.05]
+        false = bounced + chance.integers(500_000, 3_000_000, bounced.size)
+    seen = Pulses(np.sort(np.concatenate((pulses, false))))
+    found = diagnose(replace(recording, pulses={**recording.pulses, "cup": seen}), baseline())
+    named = [f.term.effect.name for f in found.findings]
+    if bursts:
+        assert (found.verdict, named) == ("unknown", [])
+        assert "come in bursts" in found.unexplained.description
+    else:
+        assert (found.verdict, named) == ("named", ["extra_pulses"])

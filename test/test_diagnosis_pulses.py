@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
     INTERVALS,
     _is_usual_longer,
+    bursts_of_bounces,
     chance_of_intervals,
     interval_statistics,
     slot_intervals,
@@ -502,3 +503,39 @@ def test_bounces_that_are_told_from_edges_leave_the_rate_to_other_effects(
     assert overlap(searcher, one, two) == pytest.approx(shared, abs=0.02)
     needed = inexactness(searcher, null, one, two)
     assert (needed > 0.0) == (shared > 0.0)
+
+
+@given(
+    seed=st.integers(0, 2**16),
+    share=st.floats(0.01, 0.15),
+    pause=st.floats(12.0, 40.0),
+    length=st.floats(1.0, 4.0),
+)
+def test_a_contact_bounces_by_chance_and_a_radio_sends_in_bursts(
+    seed: int, share: float, pause: float, length: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    true = edges(np.zeros(SLOTS))
+    bounced = true[rng.random(true.size) < share]
+    after = bounced + rng.uniform(0.001, 0.006, bounced.size)
+    sent = np.arange(0.0, true[-1], 1.0 / 12.0)
+    sent = sent[sent % pause < length]
+
+    def seen(false: FloatArray) -> tuple[float, float]:
+        time = np.sort(np.concatenate((true, false)))
+        pulses = Pulses(np.round(time * 1e9).astype(np.int64))
+        return bursts_of_bounces(pulses, SLOTS, 0, int(true[-1] * 1e9))
+
+    by_chance, _ = seen(after)
+    assert by_chance == pytest.approx(1.0, abs=0.5)
+    by_radio, squares = seen(sent)
+    assert by_radio > 2.0
+    assert squares > 1.0
+
+
+def test_of_a_counter_or_few_pulses_nobody_knows_whether_they_come_in_bursts() -> None:
+    time = np.round(edges(np.zeros(SLOTS)) * 1e9).astype(np.int64)
+    counter = Pulses(time, np.arange(time.size) / SLOTS)
+    assert bursts_of_bounces(counter, SLOTS, 0, int(time[-1])) == (1.0, 0.0)
+    assert bursts_of_bounces(Pulses(time), SLOTS, 0, int(time[-1])) == (1.0, 0.0)
+    assert bursts_of_bounces(Pulses(time), SLOTS, 0, int(time[50])) == (1.0, 0.0)

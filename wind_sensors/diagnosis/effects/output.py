@@ -110,6 +110,7 @@ EXTRA_PULSES = Effect(
     applies=_is_rotor,
     update=_extra,
     noisy=True,
+    one_by_one=True,
     form_error=0.1,
     templates=({"bounce_probability": 0.01, "bounce_delay": 0.003},),
     confusable={"calibration_drift": "pulse intervals: bounce makes some very short"},

@@ -12,12 +12,13 @@ from scipy.ndimage import uniform_filter1d
 from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.comparing.comparison import COURSE, OF_EDDIES, STATISTICS, Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import bursts_of_bounces
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import cell_signatures, window_of
 from wind_sensors.diagnosis.explaining.moments import squares_in_parts
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import in_series
-from wind_sensors.station.model import Station
+from wind_sensors.station.model import Cup, Propeller, Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -79,6 +80,13 @@ IN_EDDIES = 22.0
 concealed data, of which it is asked, one differs by 15, an offset that an eddy-current brake made,
 and a filter beside a delay by 13, the others by 6.5 at most; an imbalance that a sound vane's
 eddies on a boat in a lull asked for differed by 35."""
+
+BURSTS = 2.0
+BURSTS_SHARE = 1.0
+"""Bounces whose number in a second varies by more than so many times what chance gives, and beyond
+it by more than this many squares of that number, come in bursts: a radio, or a motor's driver, is
+taken for the contact. Of fifteen contacts that bounce none had more than 1.1 times, of four radios'
+bursts each had 10 to 21 times, and 2.9 to 13 squares."""
 
 
 def undo_each_other(naming: Naming, station: Station) -> bool:
@@ -307,6 +315,33 @@ def is_otherwise_in_eddies(naming: Naming, station: Station) -> bool:
         if _drop_by_sizes_on(naming, station, term, places) > most:
             return True
     return False
+
+
+def comes_in_bursts(naming: Naming) -> bool:
+    """Whether what should hit pulses one by one hits many at once, and then none for a while."""
+    comparison = naming.whitener.comparison
+    return any(
+        term.effect.one_by_one and false_in_bursts(comparison, term.instrument, term.interval)
+        for term in naming.fit.terms
+    )
+
+
+def false_in_bursts(comparison: Comparison, rotor: str, interval: Interval = ALWAYS) -> bool:
+    """Whether a rotor's false pulses come in bursts.
+
+    Args:
+        comparison: The recording.
+        rotor: Name.
+        interval: What is looked at.
+    """
+    instrument = comparison.station.instrument(rotor)
+    assert isinstance(instrument, Cup | Propeller)
+    start = comparison.grid.start
+    begin, end = (start + int(1e9 * edge) for edge in window_of(comparison, interval))
+    uneven, squares = bursts_of_bounces(
+        comparison.recording.pulses[rotor], instrument.pulses_per_revolution, begin, end
+    )
+    return uneven > BURSTS and squares > BURSTS_SHARE
 
 
 def _without(naming: Naming, station: Station, term: Term) -> Simulated | None:

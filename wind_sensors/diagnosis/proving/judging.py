@@ -21,6 +21,8 @@ from wind_sensors.diagnosis.healthy.calibrated_range import (
 )
 from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess_of
 from wind_sensors.diagnosis.proving.contradictions import (
+    comes_in_bursts,
+    false_in_bursts,
     goes_with_speed,
     is_discordant,
     is_otherwise_in_eddies,
@@ -60,6 +62,8 @@ LEAST_JUDGED = 0.1
 
 REPEATED = 0.01
 """With more of the reference's samples repeating those before them, something is wrong with it."""
+
+IN_BURSTS = "come in bursts, as a radio's or a motor's do: a contact bounces by chance"
 
 
 @dataclass(frozen=True)
@@ -197,6 +201,10 @@ def with_suspicion(judgement: Judgement, station: Station, workers: int) -> Judg
     """
     if judgement.verdict != "unknown" or judgement.objection:
         return judgement
+    comparison = judgement.naming.whitener.comparison
+    rotors = [name for name in comparison.recording.pulses if false_in_bursts(comparison, name)]
+    if rotors:
+        return replace(judgement, objection=f"{rotors[0]}: false pulses {IN_BURSTS}")
     suspicion = suspicion_beside(judgement.naming, station, workers)
     return judgement if suspicion is None else replace(judgement, objection=suspicion.words)
 
@@ -283,7 +291,9 @@ def _upheld(
 
 
 def _contradiction(naming: Naming, station: Station) -> str:
-    """How the signals contradict that an effect has one size; empty: they do not."""
+    """How the signals contradict the form of what is named; empty: they do not."""
+    if comes_in_bursts(naming):
+        return f"they {IN_BURSTS}"
     if goes_with_speed(naming, station):
         return "with another size in strong wind than in weak wind"
     if is_discordant(naming, station):

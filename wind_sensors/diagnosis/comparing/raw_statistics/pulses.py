@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from wind_sensors.compiled import compiled
 from wind_sensors.diagnosis.comparing.observation import Grid
@@ -43,6 +43,12 @@ MADE_UP_FOR = 0.5
 LONGEST_WAIT = 5.0
 """But not if for this share of those that lie too close or more edges are missing elsewhere, in
 gaps of no more than so many seconds."""
+
+BURST_SECONDS = 1.0
+BURST_NEIGHBOURS = 61
+FEWEST_IN_BURSTS = 30
+"""Bounces are counted in so many seconds and compared with as many such counts around; fewer in all
+tell nothing."""
 
 LOST_TURNS = 10.0
 """In a silence of so many turns, as they are before and after it, nobody counts slots."""
@@ -113,6 +119,36 @@ def without_bounces(pulses: Pulses, slots: int) -> Pulses | None:
     if np.sum(interval[waits] / usual[waits] - 1.0) > MADE_UP_FOR * np.count_nonzero(bounced):
         return None
     return Pulses(kept)
+
+
+def bursts_of_bounces(pulses: Pulses, slots: int, begin: int, end: int) -> tuple[float, float]:
+    """How much more unevenly bounces come than chance would have them.
+
+    Args:
+        pulses: Edges.
+        slots: Per turn.
+        begin, end: Of the time looked at [ns].
+
+    Returns:
+        Variance of the number in a second over what chance gives a contact of which so many of the
+        edges around bounce (1: chance), and the variance beyond chance in squares of that number.
+        (1, 0) where the edges are not known one by one, or the bounces are too few.
+    """
+    inside = pulses.time[(pulses.time >= begin) & (pulses.time <= end)]
+    if pulses.turns is not None or inside.size < FEWEST_TO_TELL:
+        return 1.0, 0.0
+    seconds: FloatArray = (np.sort(inside, kind="stable") - begin) * 1e-9
+    bounced = np.asarray(_by_slot(seconds, slots)[1])
+    if np.count_nonzero(bounced) < FEWEST_IN_BURSTS:
+        return 1.0, 0.0
+    place = (seconds / BURST_SECONDS).astype(np.int64)
+    true, false = np.bincount(place, ~bounced), np.bincount(place, bounced)
+    around_true, around_false = (
+        uniform_filter1d(counts, BURST_NEIGHBOURS, mode="nearest") for counts in (true, false)
+    )
+    expected = true * around_false / np.maximum(around_true, 1e-9)
+    beyond = float(np.sum((false - expected) ** 2 - expected))
+    return 1.0 + beyond / float(expected.sum()), beyond / float(np.sum(expected**2))
 
 
 def chance_of_intervals(one: FloatArray, other: FloatArray, edges: int) -> FloatArray:
