@@ -137,7 +137,7 @@ def bursts_of_bounces(pulses: Pulses, slots: int, begin: int, end: int) -> tuple
     inside = pulses.time[(pulses.time >= begin) & (pulses.time <= end)]
     if pulses.turns is not None or inside.size < FEWEST_TO_TELL:
         return 1.0, 0.0
-    seconds: FloatArray = (np.sort(inside, kind="stable") - begin) * 1e-9
+    seconds = np.asarray((np.sort(inside, kind="stable") - begin) * 1e-9, dtype=np.float64)
     bounced = np.asarray(_by_slot(seconds, slots)[1])
     if np.count_nonzero(bounced) < FEWEST_IN_BURSTS:
         return 1.0, 0.0
