@@ -110,9 +110,12 @@ def swing(
     i: int,
     step: float,
 ) -> float:
-    """Rate [rad/s] of a vane one step later in a wind given in the sensor's plane [m/s]."""
+    """Rate [rad/s] of a vane against its mount one step later in a wind given in the sensor's
+    plane [m/s]. The air turns it against the earth, whatever the mount does."""
     density = tracks.density[i]
-    torque = fin_torque(east, north, nose, rate, geometry, density) + tracks.extra[i]
+    turning = rate + tracks.mount_rate[i]
+    torque = fin_torque(east, north, nose, turning, geometry, density) + tracks.extra[i]
+    torque -= tracks.inertia[i] * tracks.mount_acceleration[i]
     cosine = math.cos(nose)
     sine = math.sin(nose)
     torque -= tracks.imbalance[i] * (cosine * tracks.gravity_y[i] - sine * tracks.gravity_x[i])
@@ -121,7 +124,7 @@ def swing(
         # The tunnel measured the vane with its propeller where it is: a drawing that errs does not
         # change how the vane swings.
         distance = geometry.propeller_distance
-        side = north * cosine - east * sine - rate * distance
+        side = north * cosine - east * sine - turning * distance
         speed = math.sqrt(east * east + north * north)
         torque += 0.5 * density * geometry.propeller_drag * speed * side * distance
     worn = tracks.notch[i] * max(0.0, math.cos(nose - tracks.notch_heading[i])) ** 12

@@ -34,7 +34,8 @@ class FinTracks(NamedTuple):
     (mass moment, tail heavy); gravity_x, gravity_y [m/s^2] specific force in the sensor's plane;
     notch [N m] and notch_heading [rad] of a worn spot of the bearing; spring [N m/rad] and
     spring_heading [rad] of a cable; extra [N m]; lead [m] by which the propeller's true distance
-    from the axis exceeds that of the drawing.
+    from the axis exceeds that of the drawing; mount_rate [rad/s] and mount_acceleration [rad/s^2]
+    of the mount about the vane's axis.
     """
 
     inertia: Array
@@ -51,6 +52,8 @@ class FinTracks(NamedTuple):
     spring_heading: Array
     extra: Array
     lead: Array
+    mount_rate: Array
+    mount_acceleration: Array
 
 
 @compiled
@@ -66,7 +69,8 @@ def fin_coefficient(attack: float, slope: float, stall: float, plate: float) -> 
 def fin_torque(
     east: float, north: float, nose: float, rate: float, geometry: FinGeometry, density: float
 ) -> float:
-    """Aerodynamic torque [N m] on a vane whose nose points to `nose` [rad], turning at `rate`."""
+    """Aerodynamic torque [N m] on a vane whose nose points to `nose` [rad], turning at `rate`
+    against the air."""
     cosine = math.cos(nose)
     sine = math.sin(nose)
     along = -(east * cosine + north * sine)

@@ -153,7 +153,7 @@ def build_scene(
     scene.vane.density[:] = density
     shaft = station.rotor.shaft
     scene.rotor.viscous[:] *= np.exp(-shaft.grease * (temperature - GREASE_REFERENCE))
-    _weigh_vane(scene, matrix)
+    _mount_vane(scene, matrix)
     return scene
 
 
@@ -182,7 +182,7 @@ def _rotor_tracks(station: Station, count: int) -> CupTracks | BladeTracks:
     return blade_tracks(rotor, count)
 
 
-def _weigh_vane(scene: Scene, matrix: Array) -> None:
+def _mount_vane(scene: Scene, matrix: Array) -> None:
     station = scene.station
     force = np.zeros((len(scene.time), 3))
     force[:, 2] = -GRAVITY
@@ -196,3 +196,5 @@ def _weigh_vane(scene: Scene, matrix: Array) -> None:
     force = tilted(force, station.lean, station.lean_bearing)
     scene.vane.gravity_x[:] = force[:, 0]
     scene.vane.gravity_y[:] = force[:, 1]
+    scene.vane.mount_rate[:] = scene.motion.turning[:, 2]
+    scene.vane.mount_acceleration[:] = np.gradient(scene.motion.turning[:, 2], scene.time)

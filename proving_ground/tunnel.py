@@ -116,6 +116,8 @@ def fin_tracks(shaft: Shaft, count: int, density: float = STANDARD_DENSITY) -> F
         spring_heading=level(0.0),
         extra=level(0.0),
         lead=level(0.0),
+        mount_rate=level(0.0),
+        mount_acceleration=level(0.0),
     )
 
 

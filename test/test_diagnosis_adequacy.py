@@ -9,7 +9,9 @@ import pytest
 from diagnosis_cases import STATION, baseline, recorded
 from scipy.optimize import minimize
 
+from wind_sensors.diagnosis.comparing.observation import Grid
 from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.acceptance import (
@@ -121,6 +123,20 @@ def test_a_vane_that_turned_round_the_other_way_says_nothing(
         assert left_out.min() == pytest.approx(begin, abs=4.0)
         assert left_out.max() == pytest.approx(end, abs=4.0)
         assert diagnose(_with_readings(recording, away), baseline()).verdict == "none"
+
+
+@pytest.mark.parametrize(("speed", "counts"), [(1.2, False), (5.0, True)])
+def test_a_vane_that_a_calm_leaves_turned_round_says_nothing(speed: float, counts: bool) -> None:
+    grid = Grid(0, 0.2, 4500)
+    calm = (grid.centres > 300.0) & (grid.centres < 360.0)
+    # It comes back the other way, a whole turn round.
+    turned = np.interp(grid.centres, (300.0, 330.0, 360.0), (0.0, np.pi, 2.0 * np.pi))
+    wind = np.where(calm, speed, 6.0)
+    follows = where_vanes_follow([turned], wind, grid)
+    assert follows[np.abs(grid.centres - 330.0) < 10.0].max() == float(counts)
+    assert follows[~calm].min() == 1.0
+    departure = slow_departure(turned, wind, grid)
+    assert departure[-1] == pytest.approx(2.0 * np.pi if counts else 0.0, abs=1e-6)
 
 
 def test_seconds_in_which_one_explanation_turns_round_hold_its_misfit() -> None:

@@ -40,7 +40,7 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import hole_between
 from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose
-from wind_sensors.station.model import Cup
+from wind_sensors.station.model import Cup, Vane
 from wind_sensors.station.signals import Pulses
 
 FloatArray = npt.NDArray[np.float64]
@@ -279,6 +279,22 @@ def test_a_damper_that_has_lost_its_oil_is_not_at_the_bounds_of_the_search(
 ) -> None:
     values = {**catalogue()[effect].templates[0], name: value}
     assert (name in run_away(Term(catalogue()[effect], "vane", values))) is away
+
+
+def test_oil_in_a_vane_s_bearing_is_told_from_a_fin_that_damps_more() -> None:
+    oiled = STATION.model_copy(
+        update={
+            "instruments": tuple(
+                i.model_copy(update={"viscous_damping": 3.0}) if isinstance(i, Vane) else i
+                for i in STATION.instruments
+            )
+        }
+    )
+    found = diagnose(recorded(oiled, 83, mean=4.5), baseline())
+    (finding,) = found.findings
+    assert finding.term.effect.name == "vane_damping"
+    assert finding.term.values["viscous"] == 1.0
+    assert finding.term.values["damping_factor"] == pytest.approx(4.0, rel=0.25)
 
 
 @pytest.mark.parametrize(("breakaway", "noisy"), [(1.0, False), (2.2, True)])

@@ -51,6 +51,7 @@ MAST: dict[str, Case] = {
     ),
     "vane inertia": Case(vane={"inertia_factor": 4.0}, rms=1.3),
     "vane damping": Case(vane={"damping_factor": 0.3}),
+    "oil in a vane's bearing": Case(vane={"viscous_damping": 4.0}, rms=1.3),
     "vane friction": Case(vane={"friction_speed": 1.5}),
     "late readings": Case(vane={"clock": {"latency": 0.7}}, rms=1.5),
     "drifting readings": Case(vane={"clock": {"drift": 0.02}}, rms=1.5),

@@ -16,7 +16,7 @@ from proving_ground.concealed.strangers import STRANGERS
 from proving_ground.development_set import station_plan
 from proving_ground.drive import SUBSTEPS, turn_vane
 from proving_ground.generate import Planted, generate_recording, healthy, with_effect
-from proving_ground.inflow import make_eddies
+from proving_ground.inflow import Array, make_eddies
 from proving_ground.measure import Signals, run_scene
 from proving_ground.minimum_sizes import MINIMUM_SIZES, applicable
 from proving_ground.scene import build_scene
@@ -144,6 +144,32 @@ def test_no_propeller_holds_its_vane_the_wrong_way_round(seed: int) -> None:
     away = np.abs(np.angle(np.exp(1j * (path - np.pi))))
     assert away[0] > np.radians(170.0)
     assert away[-1] < np.radians(5.0)
+
+
+def test_a_vane_without_friction_does_not_know_that_its_mount_turns() -> None:
+    vane = random_station("B", 10_003).vane
+    free = replace(vane.shaft, static=0.0, coulomb=0.0, viscous=0.0)
+    time = np.arange(int(30.0 / STEP / SUBSTEPS)) * STEP * SUBSTEPS
+    yaw = 0.4 * np.sin(2.0 * time) + 0.02 * np.sin(5.0 * time)
+    blows_to = 0.6 * np.sin(0.9 * time)
+
+    def heading(mount: Array) -> Array:
+        speed = np.array(4.0) + np.sin(0.7 * time)
+        flow = np.zeros((len(time), 3))
+        flow[:, 0] = speed * np.cos(blows_to - mount)
+        flow[:, 1] = speed * np.sin(blows_to - mount)
+        tracks = fin_tracks(free, len(time))
+        rate = np.gradient(mount, time)
+        tracks.mount_rate[:] = rate
+        tracks.mount_acceleration[:] = np.gradient(rate, time)
+        nose = np.pi - mount[0]
+        return mount + turn_vane(
+            flow, vane.geometry, tracks, float(nose), float(-rate[0]), STEP, SUBSTEPS
+        )
+
+    on_earth = heading(np.zeros_like(time))
+    assert np.ptp(on_earth) > 0.5
+    assert heading(yaw) == pytest.approx(on_earth, abs=6e-3)
 
 
 def test_friction_planted_for_a_loss_gives_that_loss(stations: dict[str, Station]) -> None:

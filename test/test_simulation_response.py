@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from wind_sensors.errors import UserError
+from wind_sensors.instruments.dynamics.vane import integrate_vane
 from wind_sensors.motion import rotations
 from wind_sensors.motion.platform_track import Motion
 from wind_sensors.simulation import Drive, ResponseState, respond
@@ -26,6 +27,7 @@ from wind_sensors.station.model import (
     Vane,
     WakeShadow,
 )
+from wind_sensors.station.parameters import vane_parameters
 
 TOPIC = Input(topic="/x")
 START = 1_700_000_000_000_000_000
@@ -170,6 +172,39 @@ def test_a_fin_that_gives_way_swings_more_slowly_in_strong_wind_only():
         share = 1.0 / (1.0 + (speed / 10.0) ** 2)
         slower = periods["soft", speed] / periods["stiff", speed]
         assert slower == pytest.approx(share**-0.5, rel=0.02)
+
+
+def test_oil_in_the_bearing_damps_a_vane_by_as_much_in_any_wind():
+    oiled = vane(viscous_damping=4.0, inertia_factor=1.5)
+    rate = 4.0 * 2.0 * oiled.damping_ratio * 8.0 / oiled.distance_constant / 1.5
+    for speed in (2.0, 12.0):
+        natural = speed / oiled.distance_constant
+        own = 2.0 * oiled.damping_ratio * natural / 1.5
+
+        def motion(t, state, natural=natural, own=own):
+            angle, turning = state
+            pull = natural**2 / 1.5 * np.sin(angle - 0.3)
+            return [turning, -(own + rate) * turning - pull]
+
+        wind = np.full((401, 3), -speed) * [np.cos(0.3), np.sin(0.3), 0.0]
+        wind[0] = (-speed, 0.0, 0.0)
+        found = respond(Station(instruments=(oiled,)), Drive(START, 0.01, wind)).angles["vane"]
+        expected = solve_ivp(motion, (0.0, 3.99), (0.0, 0.0), rtol=1e-8, dense_output=True)
+        at = np.arange(1, 400) * 0.01
+        # The wind turns within the first interval.
+        assert found.angle[1:400] == pytest.approx(expected.sol(at - 0.005)[0], abs=2e-3)
+
+
+def test_oil_in_the_bearing_holds_a_vane_against_its_mount():
+    oiled = vane(viscous_damping=3.0)
+    n = 400
+    angle, _ = integrate_vane(
+        vane_parameters(oiled), np.tile((-6.0, 0.0, 0.0), (n, 1)), np.full(n, 0.2),
+        np.zeros((n, 2)), np.ones(n), 0.05, 0.0, 0.0,
+    )  # fmt: skip
+    # In a wind that turns with the mount only the fin feels the turning, not the oil.
+    lag = 2.0 * oiled.damping_ratio * 0.2 * oiled.distance_constant / 6.0
+    assert angle[-1] == pytest.approx(-np.arcsin(lag), rel=0.01)
 
 
 def test_finer_sampling_of_the_same_wind_gives_the_same_movement():

@@ -132,7 +132,7 @@ def instruments_of(station: Station) -> Instruments:
         rotor=rotor_rows,
         response=tables,
         mounting=mounting,
-        vane=np.array([list(vane_parameters(a.instrument)) for a in axes]).reshape(len(axes), 11),
+        vane=np.array([list(vane_parameters(a.instrument)) for a in axes]).reshape(len(axes), 12),
         vane_density=np.array([a.instrument.reference_density for a in axes], dtype=np.float64),
         azimuth=np.array([a.azimuth for a in axes], dtype=np.int64),
         shadow=shadow,

@@ -193,6 +193,7 @@ def wind_heading_from_motion(
     omega = max(speed, 0.3) / p.distance_constant
     stiffness = density_ratio / (1.0 + p.softness * speed * speed) / p.inertia_factor
     other = 2.0 * p.damping_ratio * p.damping_factor * stiffness * omega * (rate + yaw_rate)
+    other += p.viscosity / p.inertia_factor * rate
     if p.imbalance != 0.0:
         across = -pull[0] * math.sin(phi) + pull[1] * math.cos(phi)
         other -= p.imbalance / p.inertia_factor * across

@@ -265,6 +265,9 @@ class Angle(Instrument):
     """Moment of inertia relative to the healthy vane's."""
     damping_factor: NonNegative = 1.0
     """Damping relative to the healthy vane's."""
+    viscous_damping: NonNegative = 0.0
+    """Damping by oil or grease in the bearing, in units of the healthy vane's own at 8 m/s. It
+    holds the vane against the mount, by as much in any wind."""
     friction_speed: NonNegative = 0.0
     """h_f [m/s]: the vane sticks while h^2 |sin(deviation)| < h_f^2."""
     imbalance: float = 0.0

@@ -18,6 +18,9 @@ from wind_sensors.instruments.dynamics.rotor import (
 from wind_sensors.instruments.dynamics.vane import VaneParameters
 from wind_sensors.station.model import Angle, Cup, Propeller, Vane
 
+VISCOUS_SPEED = 8.0
+"""Wind [m/s] in which oil in a vane's bearing is compared with the damping of its fin."""
+
 _NO_TABLE = np.ones(RESPONSE_TABLE_SIZE)
 
 
@@ -82,6 +85,7 @@ def rotor_parameters(rotor: Cup | Propeller) -> RotorParameters:
 
 def vane_parameters(vane: Angle) -> VaneParameters:
     """Arguments of the vane equation for a vane (or one axis of a bivane) of the station."""
+    own_damping = 2.0 * vane.damping_ratio * VISCOUS_SPEED / vane.distance_constant
     parameters = VaneParameters(
         distance_constant=vane.distance_constant,
         damping_ratio=vane.damping_ratio,
@@ -90,6 +94,7 @@ def vane_parameters(vane: Angle) -> VaneParameters:
         friction=vane.friction_speed**2,
         imbalance=vane.imbalance,
         aerodynamic_offset=0.0,
+        viscosity=vane.viscous_damping * own_damping,
     )
     if not isinstance(vane, Vane):
         return parameters

@@ -61,6 +61,7 @@ CEILINGS: dict[str, Ceiling] = {
     "calibration_offset": Ceiling(50.0, _SPEED),
     "torque_harmonic": Ceiling(20.0, "It is a share of the dynamic pressure's torque."),
     "damping_factor": Ceiling(100.0, "The factor is 1 for the healthy vane."),
+    "viscous_damping": Ceiling(100.0, "It is 1 for as much as the healthy vane's own at 8 m/s."),
 }
 
 

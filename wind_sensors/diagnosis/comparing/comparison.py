@@ -119,7 +119,7 @@ class Comparison(View):
             for simulated in explanations
             for v in vanes
         )
-        return where_vanes_follow(apart, self.grid)
+        return where_vanes_follow(apart, self.speed, self.grid)
 
     def misfit_outside(self, weights: FloatArray, simulated: Simulated) -> float:
         """Largest share of a vane's squared misfit that lies where weights are small."""

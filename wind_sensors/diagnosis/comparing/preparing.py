@@ -150,9 +150,11 @@ def prepare(
     )
     known_wind = where_reference_is(recording, grid)
     beside = _beside_expected(comparison)
-    departure = {name: slow_departure(angle, grid) for name, angle in beside.items()}
+    departure = {
+        name: slow_departure(angle, comparison.speed, grid) for name, angle in beside.items()
+    }
     comparison = replace(comparison, departure=departure)
-    followed = where_vanes_follow(beside.values(), grid)
+    followed = where_vanes_follow(beside.values(), comparison.speed, grid)
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
     return comparison.measuring()

@@ -28,11 +28,17 @@ LONGEST_TURNING = 20.0
 MOST_TURNING = 0.05
 """Nor is what takes a larger share of a recording."""
 
+HARDLY_HELD = 2.0
+"""Slower winds [m/s] do not count in either: a vane that they hardly hold comes round when it
+may, heavy or oiled ones late."""
+
 DEPARTURE_TIME = 5.0
 """A vane that stays away does so on average over this time [s]."""
 
 
-def where_vanes_follow(differences: Iterable[FloatArray], grid: Grid) -> FloatArray:
+def where_vanes_follow(
+    differences: Iterable[FloatArray], speed: FloatArray, grid: Grid
+) -> FloatArray:
     """Weights that are zero while a vane turns round to a wind from behind, shape (n,).
 
     Whether it does so on one side or the other hangs on a hair: measured and simulated vane may be
@@ -41,19 +47,20 @@ def where_vanes_follow(differences: Iterable[FloatArray], grid: Grid) -> FloatAr
 
     Args:
         differences: Of each vane, measured minus simulated angle at the bins [rad].
+        speed: Slow wind speed at the bins [m/s], shape (n,).
         grid: Bins.
     """
     weight = np.ones(grid.n)
     for difference in differences:
         begins, ends = _turning(difference, grid)
-        if _stays_away(begins, ends, grid):
+        if _stays_away(begins, ends, speed, grid):
             continue
         for begin, end in zip(begins, ends, strict=True):
             weight[begin:end] = 0.0
     return soft(weight)
 
 
-def slow_departure(difference: FloatArray, grid: Grid) -> FloatArray:
+def slow_departure(difference: FloatArray, speed: FloatArray, grid: Grid) -> FloatArray:
     """How far a vane points from where it should, slowly and continuously [rad], shape (n,).
 
     A vane that counts the other way round comes to point backwards, where each reading would lie a
@@ -61,12 +68,13 @@ def slow_departure(difference: FloatArray, grid: Grid) -> FloatArray:
 
     Args:
         difference: Measured minus simulated angle at the bins [rad].
+        speed: Slow wind speed at the bins [m/s], shape (n,).
         grid: Bins.
 
     Returns:
         Nought for vanes that stay near, or turn round for some seconds only.
     """
-    if not _stays_away(*_turning(difference, grid), grid):
+    if not _stays_away(*_turning(difference, grid), speed, grid):
         return np.zeros(grid.n)
     width = round(DEPARTURE_TIME / grid.dt)
     east, north = (
@@ -81,10 +89,12 @@ def _turning(difference: FloatArray, grid: Grid) -> tuple[IndexArray, IndexArray
     return _runs(_widened(away, round(BESIDE_TURNING / grid.dt)))
 
 
-def _stays_away(begins: IndexArray, ends: IndexArray, grid: Grid) -> bool:
+def _stays_away(begins: IndexArray, ends: IndexArray, speed: FloatArray, grid: Grid) -> bool:
     """Whether a vane is turned round for longer, or more often, than by a wind from behind."""
-    often = np.sum(ends - begins) > MOST_TURNING * grid.n
-    return bool(often or np.any((ends - begins) * grid.dt > LONGEST_TURNING))
+    held = np.concatenate(([0], np.cumsum(speed > HARDLY_HELD)))
+    lasting = held[ends] - held[begins]
+    often = np.sum(lasting) > MOST_TURNING * grid.n
+    return bool(often or np.any(lasting * grid.dt > LONGEST_TURNING))
 
 
 def _widened(inside: BoolArray, bins: int) -> BoolArray:

@@ -80,14 +80,18 @@ VANE_INERTIA = Effect(
 
 def _damping(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Angle)
-    return {"damping_factor": entry.damping_factor * values["damping_factor"]}
+    factor = values["damping_factor"]
+    if values.get("viscous", 0.0) == 0.0 or factor < 1.0:
+        return {"damping_factor": entry.damping_factor * factor}
+    return {"viscous_damping": entry.viscous_damping + factor - 1.0}
 
 
 VANE_DAMPING = Effect(
     name="vane_damping",
     meaning="The vane's swing dies out faster or more slowly than calibrated.",
     entrance="response",
-    equation="zeta = factor * zeta_cal",
+    equation="zeta = factor * zeta_cal, or with an oil in the bearing, which damps by as much in "
+    "any wind, zeta = zeta_cal * (1 + (factor - 1) * 8 m/s / U)",
     source="K94, eq. (40)",
     region="near the vane's resonance, U/(2 pi l_v)",
     smooths=True,
@@ -96,12 +100,17 @@ VANE_DAMPING = Effect(
             "damping_factor", "1", 0.05, 20.0, healthy=1.0, minimum=0.4, step=0.1,
             starts=(0.5, 2.0, 4.0, 10.0),
         ),
+        Parameter("viscous", "1", 0.0, 1.0, starts=(0.0, 1.0), value_from="forms"),
     ),
     applies=is_vane,
     update=_damping,
     form_error=0.15,
     own_law=True,
-    templates=({"damping_factor": 1.4}, {"damping_factor": 0.6}),
+    templates=(
+        {"damping_factor": 1.4, "viscous": 0.0},
+        {"damping_factor": 0.6, "viscous": 0.0},
+        {"damping_factor": 1.4, "viscous": 1.0},
+    ),
     confusable={
         "vane_inertia": "a release test from 10 degrees",
         "vane_friction": "low wind: friction holds the vane still, damping does not",

@@ -4,10 +4,10 @@ With phi the heading of the nose in the sensor frame, alpha the heading the wind
 speed across the vane's axis and Omega the yaw rate of the mount::
 
     phi'' = -2 zeta (h/l_v) (phi' + Omega) - (h/l_v)^2 sin(phi - alpha) - Omega'
-            + (-b g_x sin phi + b g_y cos phi) - (h_f/l_v)^2 sgn(phi')
+            + (-b g_x sin phi + b g_y cos phi) - (h_f/l_v)^2 sgn(phi') - c phi'
 
 (Kristensen (1994), (36) to (43), with sin for large deviations). Damping acts on the turning
-against the air, friction on the turning against the mount.
+against the air, friction and an oil in the bearing on the turning against the mount.
 """
 
 from __future__ import annotations
@@ -50,6 +50,8 @@ class VaneParameters(NamedTuple):
     """Standard width of the place [rad]."""
     softness: float = 0.0
     """1/h_y^2 [s^2/m^2]: a fin that bends away holds by 1/(1 + h^2/h_y^2) of a stiff one's."""
+    viscosity: float = 0.0
+    """c [1/s]: torque of the oil in the bearing per turning rate and healthy moment of inertia."""
 
 
 @compiled
@@ -76,6 +78,7 @@ def vane_acceleration(
     across = wind_y * math.cos(balanced) - wind_x * math.sin(balanced)
     restoring = pace * across / p.distance_constant
     damping = 2.0 * p.damping_ratio * p.damping_factor * pace * (phi_rate + yaw_rate)
+    damping += p.viscosity / p.inertia_factor * phi_rate
     gravity = 0.0
     if p.imbalance != 0.0:
         gravity = (
@@ -127,6 +130,7 @@ def advance_vane(
     stiffness = density_ratio / p.inertia_factor
     omega = h_largest / p.distance_constant * math.sqrt(stiffness)
     rate = omega * max(1.0, 2.0 * p.damping_ratio * p.damping_factor * math.sqrt(stiffness))
+    rate += p.viscosity / p.inertia_factor
     substeps = 1 + int(2.0 * dt * rate)
     if p.friction > 0.0 or p.catch > 0.0:
         substeps = max(substeps, 4)
