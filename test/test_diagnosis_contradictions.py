@@ -87,7 +87,7 @@ def test_an_offset_is_the_same_in_strong_wind(with_speed: bool) -> None:
     # A bearing has its own law of the speed, and so has what damps.
     for own in (
         Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}),
-        Term(catalogue()["vane_damping"], "vane", {"damping_factor": 4.0}),
+        Term(catalogue()["vane_damping"], "vane", {"damping_factor": 4.0, "viscous": 0.0}),
     ):
         assert not goes_with_speed(replace(naming, fit=replace(naming.fit, terms=(own,))), STATION)
 
@@ -229,7 +229,7 @@ def test_a_filter_takes_from_the_power_of_eddies_what_it_takes_from_the_course(
     [
         ("vane_inertia", {"inertia_factor": 2.0}, True),
         ("timestamp_latency", {"latency": 0.5}, False),
-        ("vane_damping", {"damping_factor": 2.0}, False),
+        ("vane_damping", {"damping_factor": 2.0, "viscous": 0.0}, False),
         ("vane_friction", {"friction_speed": 2.0}, False),
     ],
 )

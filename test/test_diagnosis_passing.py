@@ -111,7 +111,7 @@ def test_a_gust_is_taken_off_a_gain_but_not_that_one_moment_is_always_the_best(
         ("timestamp_latency", {"latency": 0.4}, 0.0, False),
         ("timestamp_latency", {"latency": 0.4}, 30.0, True),
         ("clock_drift", {"drift": 900.0}, 4.0, False),
-        ("vane_damping", {"damping_factor": 3.0}, 0.0, True),
+        ("vane_damping", {"damping_factor": 3.0, "viscous": 0.0}, 0.0, True),
     ],
 )
 def test_one_swing_of_the_wind_makes_no_clock_late(

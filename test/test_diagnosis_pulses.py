@@ -28,7 +28,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     stillness_statistics,
 )
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.acceptance import inexactness, only_makes_good, overlap
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
@@ -40,7 +40,7 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import hole_between
 from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose
-from wind_sensors.station.model import Cup, Vane
+from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Pulses
 
 FloatArray = npt.NDArray[np.float64]
@@ -282,14 +282,7 @@ def test_a_damper_that_has_lost_its_oil_is_not_at_the_bounds_of_the_search(
 
 
 def test_oil_in_a_vane_s_bearing_is_told_from_a_fin_that_damps_more() -> None:
-    oiled = STATION.model_copy(
-        update={
-            "instruments": tuple(
-                i.model_copy(update={"viscous_damping": 3.0}) if isinstance(i, Vane) else i
-                for i in STATION.instruments
-            )
-        }
-    )
+    oiled = with_keys(STATION, "vane", {"viscous_damping": 3.0})
     found = diagnose(recorded(oiled, 83, mean=4.5), baseline())
     (finding,) = found.findings
     assert finding.term.effect.name == "vane_damping"
