@@ -27,7 +27,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
     total,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit
-from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS, BLIND_IN_PARTS
+from wind_sensors.diagnosis.explaining.guesses import BLIND_IN_PARTS
 from wind_sensors.diagnosis.explaining.leading import (
     held_throughout,
     leader_of,
@@ -60,10 +60,6 @@ FAR_BEHIND = 0.8
 
 WORTH_JUDGING = 0.5
 """Share of the needed gain that a fit must bring before the noise is judged again."""
-
-UNSEEN_BESIDE = BLIND_EFFECTS - {"clock_drift"}
-"""Effects whose guesses are tried beside others as they are, for a small size shows no way to them
-(the guesses of a clock's drift are far apart)."""
 
 WORTH_ANOTHER_TURN = 14.0
 """Largest linear score below which no further effect is looked for."""
@@ -201,16 +197,7 @@ def _further_fits(
     known = {starts[0].key: starts for starts in candidates}
     alone = [f for f in singles if f.terms[0].interval == ALWAYS and eligible(f.terms)]
     large = [*sorted(alone, key=total)[:LARGE_CANDIDATES], *apart]
-    unseen = [
-        guess
-        for key, guesses in searcher.guesses.items()
-        if key[0] in UNSEEN_BESIDE and eligible(guesses)
-        for guess in guesses
-    ]
-    beside = _promising_beside(
-        searcher, whitener, current, [*(single.terms[0] for single in alone), *unseen]
-    )
-    for term in (*(single.terms[0] for single in large), *beside, *hidden):
+    for term in (*(single.terms[0] for single in large), *hidden):
         if not eligible([term]):
             continue
         if term.key not in known:
@@ -220,37 +207,6 @@ def _further_fits(
             replace(term, values=values) for values in term.effect.either_sign(term.values)
         ]
     return searcher.fit_all(whitener, current, [*candidates, *windowed])
-
-
-def _promising_beside(
-    searcher: Searcher, whitener: Whitener, current: Fit, starts: Sequence[Term]
-) -> list[Term]:
-    """Effects that explain much beside the terms so far, in the sizes from which fits start.
-
-    Alone, what the terms so far explain may hide them, and a small size may show no way to them.
-
-    Args:
-        searcher: The search.
-        whitener: The null of the terms so far.
-        current: The terms so far.
-        starts: Effects in their sizes.
-    """
-
-    def cost(start: Term) -> float:
-        simulated = searcher.comparison.possible(
-            planted(searcher.station, [*current.terms, start])
-        )
-        return np.inf if simulated is None else float(np.sum(whitener.of(simulated) ** 2))
-
-    costs = in_parallel(cost, starts, searcher.workers)
-    best: dict[tuple[str, str], tuple[float, Term]] = {}
-    for beside, start in zip(costs, starts, strict=True):
-        if current.cost - beside > WORTH_ANOTHER_TURN and (
-            start.key not in best or beside < best[start.key][0]
-        ):
-            best[start.key] = (beside, start)
-    ranked = sorted(best.values(), key=lambda pair: pair[0])
-    return [start for _, start in ranked[:LARGE_CANDIDATES]]
 
 
 def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -> list[Fit]:
