@@ -79,6 +79,21 @@ def test_what_has_no_interval_shows_none() -> None:
     assert sizes_of(unknown, STATION)[0].text == "gain 0.93"
 
 
+def test_what_is_so_or_not_is_told_in_a_word() -> None:
+    oiled = finding(
+        "vane_damping",
+        damping_factor=Estimate(4.7, 3.3, 6.2, "1"),
+        viscous=Estimate(1.0, 0.0, 1.0, "1"),
+    )
+    assert [size.text for size in sizes_of(oiled, STATION)] == [
+        "damping factor 4.7 (3.3 to 6.2)",
+        "viscous yes",
+    ]
+    # A number of forms is a number.
+    stiff = finding("bearing_friction", breakaway=Estimate(2.2, 1.0, 5.0, "1"))
+    assert sizes_of(stiff, STATION)[0].text == "breakaway 2.2 (1 to 5)"
+
+
 def test_what_acts_together_and_what_is_not_told_apart_read_differently() -> None:
     late, offset, gain = (
         finding(name) for name in ("clock_drift", "calibration_offset", "calibration_drift")

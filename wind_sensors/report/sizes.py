@@ -53,7 +53,17 @@ def sizes_of(finding: Finding, station: Station) -> list[Size]:
         finding: The finding.
         station: Tells whether headings count from north or from the bow.
     """
-    return [_size(name, e, station) for name, e in finding.parameters.items()]
+    either_or = {
+        p.name
+        for p in finding.term.effect.parameters
+        if p.value_from == "forms" and (p.low, p.high) == (0.0, 1.0)
+    }
+    return [
+        Size(words(name), "yes" if e.value == 1.0 else "no", "", "", "")
+        if name in either_or
+        else _size(name, e, station)
+        for name, e in finding.parameters.items()
+    ]
 
 
 def _size(name: str, e: Estimate, station: Station) -> Size:
