@@ -12,7 +12,14 @@ from scipy.ndimage import uniform_filter1d
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
-from wind_sensors.diagnosis.explaining.explanation import Judged, Naming, evidence, no_terms
+from wind_sensors.diagnosis.explaining import leading, rounds
+from wind_sensors.diagnosis.explaining.explanation import (
+    Judged,
+    Naming,
+    evidence,
+    judged,
+    no_terms,
+)
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.leading import held_throughout
 from wind_sensors.diagnosis.explaining.moves import looked_around
@@ -265,6 +272,33 @@ def test_what_holds_throughout_is_not_said_to_pass(planted: Interval) -> None:
     kept = held_throughout(searcher, Judged(one, null, evidence(one, null)), None)
     assert kept.fit.terms[0].interval == planted
     assert no_terms(null, searcher).cost > kept.fit.cost
+
+
+def test_what_would_miss_the_eddies_of_the_whole_record_is_not_said_to_hold_throughout(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searcher, null = searched("vane_friction", "vane", {"friction_speed": 2.0})
+    passing = Term(
+        catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}, (150.0, None)
+    )
+    one = fit(null, STATION, [passing], searcher.bank.without)
+    null = searcher.whitener(one.simulated)
+    candidate = Judged(one, null, evidence(one, null))
+    assert held_throughout(searcher, candidate, None).fit.terms[0].interval == ALWAYS
+    monkeypatch.setattr(leading, "calms_too_much", lambda *_: True)
+    assert held_throughout(searcher, candidate, None).fit.terms[0].interval == (150.0, None)
+
+
+@pytest.mark.parametrize("planted", [ALWAYS, (150.0, None)])
+def test_a_part_that_explains_less_than_the_whole_only_hides_where_eddies_are_missed(
+    monkeypatch: pytest.MonkeyPatch, planted: Interval
+) -> None:
+    searcher, null = searched("vane_friction", "vane", {"friction_speed": 2.0}, planted)
+    monkeypatch.setattr(rounds, "calms_too_much", lambda *_: True)
+    sticks = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
+    always = judged(searcher, [fit(null, STATION, [sticks], searcher.bank.without)])
+    parts = rounds._where_they_calm(searcher, no_terms(null, searcher), always, None)
+    assert bool(parts) is (planted != ALWAYS)
 
 
 @pytest.mark.parametrize("bursts", [True, False])

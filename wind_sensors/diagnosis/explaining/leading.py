@@ -9,6 +9,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.explaining.acceptance import (
     brought,
+    calms_too_much,
     inexactness,
     is_plausible,
     needed_gain,
@@ -249,7 +250,8 @@ def held_throughout(
 
     A fit that has to find a large effect from a small one may go astray over the whole record and
     arrive in a part of it. An interval that the raw signals show by themselves stays unless the
-    whole record explains clearly more.
+    whole record explains clearly more; and what would take away eddies that the signals have holds
+    in its part only.
 
     Args:
         searcher: The search.
@@ -272,10 +274,13 @@ def held_throughout(
         again = fit(one.whitener, searcher.station, terms, searcher.bank.without)
         always += judged(searcher, [again], named)
     allowed = -ONSET_GAIN if read else _as_well(named, gain)
+    before = named if named is not None else no_terms(one.whitener, searcher)
     as_well = [
         other
         for other in always
-        if is_plausible(other.fit.terms[-1]) and other.evidence < one.evidence + allowed
+        if is_plausible(other.fit.terms[-1])
+        and other.evidence < one.evidence + allowed
+        and not calms_too_much(searcher, other, before)
     ]
     return min(as_well, key=lambda other: other.evidence, default=one)
 

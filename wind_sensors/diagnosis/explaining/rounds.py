@@ -338,7 +338,8 @@ def _where_they_calm(
     """In a part of the record, what would take eddies away if it always held.
 
     A vane that sticks from the middle on is seen by how it turns, of which the record has one
-    statistic; the screening of parts does not see it.
+    statistic; the screening of parts does not see it. If that explains less than what always
+    holds, the part only leaves out where its eddies are missed.
 
     Args:
         searcher: The search.
@@ -351,8 +352,14 @@ def _where_they_calm(
         newest = one.fit.terms[-1]
         always = newest.interval == ALWAYS and not newest.effect.legible
         if always and calms_too_much(searcher, one, current):
-            found.append(in_a_part(searcher, one.whitener, one.fit))
-    return judged(searcher, [part for part in found if plausible(part)], named)
+            part = in_a_part(searcher, one.whitener, one.fit)
+            if plausible(part):
+                found += [
+                    again
+                    for again in judged(searcher, [part], named)
+                    if again.evidence <= one.evidence
+                ]
+    return found
 
 
 def _with_sharp_intervals(
