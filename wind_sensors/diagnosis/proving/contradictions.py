@@ -85,7 +85,7 @@ BURSTS = 2.0
 BURSTS_SHARE = 1.0
 """Bounces whose number in a second varies by more than so many times what chance gives, and beyond
 it by more than this many squares of that number, come in bursts: a radio, or a motor's driver, is
-taken for the contact. Of fifteen contacts that bounce none had more than 1.1 times, of four radios'
+taken for the contact. Of eight contacts that bounce none had more than 1.1 times, of four radios'
 bursts each had 10 to 21 times, and 2.9 to 13 squares."""
 
 

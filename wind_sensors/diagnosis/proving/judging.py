@@ -202,9 +202,10 @@ def with_suspicion(judgement: Judgement, station: Station, workers: int) -> Judg
     if judgement.verdict != "unknown" or judgement.objection:
         return judgement
     comparison = judgement.naming.whitener.comparison
-    rotors = [name for name in comparison.recording.pulses if false_in_bursts(comparison, name)]
-    if rotors:
-        return replace(judgement, objection=f"{rotors[0]}: false pulses {IN_BURSTS}")
+    for channel in comparison.channels:
+        rotor = channel.instrument
+        if channel.kind == "rotor_rate" and false_in_bursts(comparison, rotor):
+            return replace(judgement, objection=f"{rotor}: false pulses {IN_BURSTS}")
     suspicion = suspicion_beside(judgement.naming, station, workers)
     return judgement if suspicion is None else replace(judgement, objection=suspicion.words)
 
