@@ -543,8 +543,16 @@ def test_a_contact_bounces_by_chance_and_a_radio_sends_in_bursts(
 
 
 def test_of_a_counter_or_few_pulses_nobody_knows_whether_they_come_in_bursts() -> None:
-    time = np.round(edges(np.zeros(SLOTS)) * 1e9).astype(np.int64)
+    true = edges(np.zeros(SLOTS))
+    sent = np.arange(0.0, true[-1], 1.0 / 12.0)
+    both = np.sort(np.concatenate((true, sent[sent % 20.0 < 2.0])))
+    time = np.round(both * 1e9).astype(np.int64)
+    end = int(time[-1])
+    assert bursts_of_bounces(Pulses(time), SLOTS, 0, end)[0] > 2.0
     counter = Pulses(time, np.arange(time.size) / SLOTS)
-    assert bursts_of_bounces(counter, SLOTS, 0, int(time[-1])) == (1.0, 0.0)
-    assert bursts_of_bounces(Pulses(time), SLOTS, 0, int(time[-1])) == (1.0, 0.0)
-    assert bursts_of_bounces(Pulses(time), SLOTS, 0, int(time[50])) == (1.0, 0.0)
+    assert bursts_of_bounces(counter, SLOTS, 0, end) == (1.0, 0.0)
+    # A hundred edges, and some thousands of which one in a thousand bounces.
+    assert bursts_of_bounces(Pulses(time), SLOTS, 0, int(time[100])) == (1.0, 0.0)
+    seldom = np.sort(np.concatenate((true, true[10::1000] + 0.003)))
+    few = Pulses(np.round(seldom * 1e9).astype(np.int64))
+    assert bursts_of_bounces(few, SLOTS, 0, end) == (1.0, 0.0)
