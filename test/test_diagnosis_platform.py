@@ -1,4 +1,4 @@
-"""The inflow of a multirotor's own rotors, named from flight data."""
+"""What a carrier does to the wind at its sensors: rotors that blow on them, and waves."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import pytest
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.healthy.baseline import Baseline
+from wind_sensors.diagnosis.healthy.baseline import Baseline, default_channel
 from wind_sensors.diagnosis.healthy.learning import learn
+from wind_sensors.diagnosis.healthy.whitening import residual_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.estimation import process
 from wind_sensors.recordings.station_files import load_station
 from wind_sensors.simulation import Scenario, Trajectory, simulate
-from wind_sensors.simulation.trajectories import multirotor
+from wind_sensors.simulation.trajectories import boat, multirotor
 from wind_sensors.station.model import Downwash, Input, Reference, Station
 from wind_sensors.station.signals import Recording
 from wind_sensors.turbulence.synthesis import isotropic_spec
@@ -64,6 +65,34 @@ def test_a_flight_tells_the_inflow_of_its_rotors() -> None:
         assert estimate.low < planted < estimate.high
     assert finding.proof is not None
     assert finding.proof.excess_removed > 0.8
+
+
+def on_waves(seed: int, eddies: float) -> Recording:
+    """The ready boat under way in a steady breeze with so much turbulence."""
+    ready = load_station("usv")
+    reference = Reference(topic=Input(topic="/reference/wind"), separation=0.5)
+    wind = isotropic_spec(8.0, eddies, 60.0, seed=seed)
+    scenario = Scenario(wind, duration=600.0, seed=seed, trajectory=boat(seed=5))
+    return simulate(ready.model_copy(update={"reference": reference}), scenario)
+
+
+def test_waves_are_expected_in_full_where_the_references_eddies_are_not() -> None:
+    """What a mount does is known, however little the reference tells of the wind at the sensor."""
+    sailed, elsewhere = on_waves(1, 0.06), on_waves(2, 0.06)
+    comparison = prepare(replace(sailed, reference=elsewhere.reference))
+    simulated = comparison.simulate(comparison.station)
+    calm = prepare(on_waves(3, 1e-3))
+    waves = calm.simulate(calm.station)
+    known = default_channel(comparison.channels[0])
+    for channel in comparison.channels:
+        n = comparison.coefficients
+        frequency = np.arange(n) / (2.0 * comparison.grid.n * comparison.grid.dt)
+        here = (frequency > 0.08) & (frequency < 0.3)
+        of_waves = waves.cosine[channel.name][:n][here]
+        _, slope, left = residual_of(comparison, simulated, known, channel)
+        assert np.mean(slope[here]) < 0.8
+        share = float(of_waves @ left[here]) / float(of_waves @ of_waves)
+        assert abs(share) < 0.1
 
 
 def test_an_effect_adds_to_what_a_station_already_states() -> None:

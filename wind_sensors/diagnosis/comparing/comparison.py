@@ -69,6 +69,23 @@ class Trust:
     activity_deviation: FloatArray
 
 
+@dataclass(frozen=True)
+class Moving:
+    """What the motion of a mount makes of its instruments' signals in a wind without eddies.
+
+    However little the reference tells of the eddies at the sensors, this is known, and expected in
+    full.
+
+    Attributes:
+        station: The station, moving as it is believed to.
+        pulses, angles: Of its instruments in that wind.
+    """
+
+    station: Station
+    pulses: Mapping[str, Pulses]
+    angles: Mapping[str, Angles]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Comparison(View):
     """One recording, viewed beside simulations of it.
@@ -88,6 +105,8 @@ class Comparison(View):
         debounced: Pulses without bounces of the rotors whose contacts bounce. Bounces show one by
             one, so that the series, recorded and simulated, do without them; in the spectra and
             statistics they stay.
+        moving: What the mount's motion makes of the signals; None on a mast.
+        by_motion: What is seen of that.
     """
 
     recording: Recording
@@ -97,6 +116,8 @@ class Comparison(View):
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
     repeated: float = 0.0
     debounced: Mapping[str, Pulses] = field(default_factory=dict, repr=False)
+    moving: Moving | None = field(default=None, repr=False)
+    by_motion: Simulated | None = field(default=None, repr=False, compare=False)
     _simulated: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
     )
@@ -109,7 +130,11 @@ class Comparison(View):
     def measuring(self) -> Comparison:
         """The same comparison with what is seen of the recording."""
         pulses, angles = self.recording.pulses, self.recording.angles
-        return replace(self, measured=self.observe(pulses, angles, self.debounced))
+        measured = self.observe(pulses, angles, self.debounced)
+        if self.moving is None:
+            return replace(self, measured=measured)
+        by_motion = self.observe(self.moving.pulses, self.moving.angles)
+        return replace(self, measured=measured, by_motion=by_motion)
 
     def where_vanes_follow(self, explanations: Iterable[Simulated]) -> FloatArray:
         """Weights that are zero while a vane and one of its simulations turn round apart, (n,)."""
@@ -138,6 +163,30 @@ class Comparison(View):
         flow = WindAtSensors(self.station, self.drive).flow(first).wind
         drive = delayed(self.drive, flow, place)
         return replace(self, drive=drive, memory=DriveMemory(drive))
+
+    def residual(self, simulated: Simulated, channel: str, slope: FloatArray) -> FloatArray:
+        """Cosine coefficients of a channel beyond what is expected of it.
+
+        Args:
+            simulated: Best simulation.
+            channel: Its name.
+            slope: Share of what the wind does in the simulation that is expected, of each.
+        """
+        seen, expected = self.beyond_motion(simulated, channel)
+        return seen - slope * expected
+
+    def beyond_motion(self, simulated: Simulated, channel: str) -> tuple[FloatArray, FloatArray]:
+        """Measured and simulated cosine coefficients without what the mount's motion makes.
+
+        Args:
+            simulated: The station that moves.
+            channel: Its name.
+        """
+        seen, expected = self.measured.cosine[channel], simulated.cosine[channel]
+        if channel not in simulated.by_motion_cosine:
+            return seen, expected
+        known = simulated.by_motion_cosine[channel]
+        return seen - known, expected - known
 
     @property
     def unseen(self) -> Simulated:
@@ -216,6 +265,25 @@ class Comparison(View):
             return None
 
     def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
+        """Series and statistics of one instrument, and what the mount's motion makes of it."""
+        seen = self._observed_alone(station, instrument)
+        if self.moving is None or self.by_motion is None:
+            return seen
+        believed = self.moving.station
+        others = tuple(c for c in believed.changes if c.instrument != PLATFORM)
+        changes = (*others, *(c for c in station.changes if c.instrument == PLATFORM))
+        moved = {"platform": station.platform, "changes": changes}
+        otherwise = believed.model_copy(update=moved)
+        (name,) = seen.series
+        series, cosine = self.by_motion.series[name], self.by_motion.cosine[name]
+        if otherwise != believed:
+            # The eddies stay what they are: what changes is the motion's.
+            before, after = (self._observed_alone(s, instrument) for s in (believed, otherwise))
+            series = series + after.series[name] - before.series[name]
+            cosine = cosine + after.cosine[name] - before.cosine[name]
+        return replace(seen, by_motion={name: series}, by_motion_cosine={name: cosine})
+
+    def _observed_alone(self, station: Station, instrument: str) -> Simulated:
         """Series and statistics of one instrument."""
         reaching = self._reaching(station, instrument)
         changes = tuple(c for c in station.changes if c.instrument in {*reaching, PLATFORM})
@@ -270,21 +338,18 @@ class Comparison(View):
             slow = (self.direction - np.mean(self.direction)) * self.speed
             measured, expected = measured + slow, expected + slow
         n = self.coefficients
-        measured, expected = self.masked(measured), self.masked(expected)
-        return spectra.coherence_of(
-            spectra.to_cosine(measured)[:n], spectra.to_cosine(expected)[:n],
-            self.grid.dt, self.grid.n,
-        )  # fmt: skip
+        measured, expected = (
+            spectra.to_cosine(self.masked(series))[:n] - simulated.by_motion_cosine.get(name, 0.0)
+            for series in (measured, expected)
+        )
+        return spectra.coherence_of(measured, expected, self.grid.dt, self.grid.n)
 
     def vector(self, simulated: Simulated, trust: Mapping[str, Trust]) -> FloatArray:
         """Whitened differences of all channels, of all statistics, of all activities."""
         parts = []
         for channel in self.channels:
             t = trust[channel.name]
-            parts.append(
-                (self.measured.cosine[channel.name] - t.slope * simulated.cosine[channel.name])
-                / t.deviation
-            )
+            parts.append(self.residual(simulated, channel.name, t.slope) / t.deviation)
         for channel in self.channels:
             t = trust[channel.name]
             difference = (
@@ -336,6 +401,56 @@ class Comparison(View):
         """
         return np.asarray(self.channel_of_each + len(self.channels) * self.kind_of_each)
 
+    def whitened_changes(self, changes: FloatArray, trust: Mapping[str, Trust]) -> FloatArray:
+        """How far `vector` falls when what is compared changes.
+
+        Args:
+            changes: Of `Simulated.flat`, one change or one a row, shape (..., l) and on a mount
+                that moves (..., l + coefficients).
+            trust: Noise of each channel.
+
+        Returns:
+            Shape (..., l).
+        """
+        weights = self.weights(trust)
+        whitened = changes[..., : weights.size] * weights
+        by_motion = changes[..., weights.size :]
+        if by_motion.shape[-1] > 0:
+            rest = [(1.0 - t.slope) / t.deviation for t in (trust[c.name] for c in self.channels)]
+            whitened[..., : by_motion.shape[-1]] += by_motion * np.concatenate(rest)
+        return np.asarray(whitened)
+
+    def whitened_while(
+        self,
+        channel: Channel,
+        without: Simulated,
+        corrected: Simulated,
+        trust: Mapping[str, Trust],
+        while_: FloatArray,
+    ) -> FloatArray:
+        """Whitened coefficients of what changes in one channel, weighted in time.
+
+        Args:
+            channel: Of the comparison.
+            without, corrected: Simulations before and after.
+            trust: Noise of each channel.
+            while_: Weights of the bins, shape (..., n).
+
+        Returns:
+            Shape (..., coefficients).
+        """
+        name = channel.name
+        t = trust[name]
+        changed = self.masked(corrected.series[name] - without.series[name])
+        if not np.any(changed):
+            return np.zeros((*while_.shape[:-1], self.coefficients))
+        whitened = t.slope * spectra.to_cosine(while_ * changed)[..., : self.coefficients]
+        if name in without.by_motion:
+            moved = self.masked(corrected.by_motion[name] - without.by_motion[name])
+            share = (1.0 - t.slope) * spectra.to_cosine(while_ * moved)[..., : self.coefficients]
+            whitened = whitened + share
+        return np.asarray(whitened / t.deviation)
+
     def weights(self, trust: Mapping[str, Trust]) -> FloatArray:
         """How far `vector` falls when what is compared rises by one, shape (l,)."""
         parts = [trust[c.name].slope / trust[c.name].deviation for c in self.channels]
@@ -354,9 +469,7 @@ class Comparison(View):
         for channel in self.channels:
             name = channel.name
             full = np.zeros(self.grid.n)
-            difference = (
-                self.measured.cosine[name] - trust[name].slope * simulated.cosine[name]
-            )
+            difference = self.residual(simulated, name, trust[name].slope)
             full[: difference.size] = difference
             out[name] = spectra.from_cosine(full)
         return out

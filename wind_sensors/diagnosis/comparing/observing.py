@@ -62,6 +62,9 @@ class Simulated:
         counted: Segments that count, shape (segments,).
         chance: By channel name: variance that pulses lost or bouncing by chance add to each slow
             coefficient; a channel that has none is left out.
+        by_motion: By channel name: what the known motion of the mount makes of the series in a wind
+            without eddies; empty on a mast.
+        by_motion_cosine: Its coefficients.
     """
 
     cosine: dict[str, FloatArray]
@@ -70,6 +73,8 @@ class Simulated:
     levels: dict[str, FloatArray]
     counted: npt.NDArray[np.bool_]
     chance: dict[str, float] = field(default_factory=dict)
+    by_motion: dict[str, FloatArray] = field(default_factory=dict)
+    by_motion_cosine: dict[str, FloatArray] = field(default_factory=dict)
 
     def with_others(self, others: Simulated) -> Simulated:
         """The same with channels taken from another."""
@@ -80,6 +85,8 @@ class Simulated:
             {**self.levels, **others.levels},
             self.counted,
             {**{k: v for k, v in self.chance.items() if k not in others.series}, **others.chance},
+            {**self.by_motion, **others.by_motion},
+            {**self.by_motion_cosine, **others.by_motion_cosine},
         )
 
     def activity(self, channel: str) -> FloatArray:
@@ -87,11 +94,15 @@ class Simulated:
         return activity.contrasts(self.levels[channel], self.counted).ravel()
 
     def flat(self, channels: Sequence[Channel]) -> FloatArray:
-        """What is compared: coefficients of all channels, all statistics, all activities, (l,)."""
+        """What is compared: coefficients of all channels, all statistics, all activities, (l,).
+
+        On a mount that moves, the coefficients that its motion makes follow.
+        """
         return np.concatenate(
             [self.cosine[c.name] for c in channels]
             + [self.statistics[c.name] for c in channels]
             + [self.activity(c.name) for c in channels]
+            + [self.by_motion_cosine[c.name] for c in channels if self.by_motion_cosine]
         )
 
 

@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
-from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.comparison import Comparison, Moving
 from wind_sensors.diagnosis.comparing.counted_time import where_reference_is, without_repeats
 from wind_sensors.diagnosis.comparing.observation import (
     SERIES_INTERVAL,
@@ -142,6 +142,8 @@ def prepare(
         debounced=_debounced(recording),
     )
     simulated, angles = comparison.signals(believed)
+    if drive.motion is not None:
+        comparison = replace(comparison, moving=_in_slow_wind(comparison, believed))
     turning = _where_rotors_turn(comparison, simulated)
     comparison = replace(
         comparison,
@@ -158,6 +160,15 @@ def prepare(
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
     return comparison.measuring()
+
+
+def _in_slow_wind(comparison: Comparison, moving: Station) -> Moving:
+    """What the motion of a station makes of its signals."""
+    drive = comparison.drive
+    width = min(int(DIRECTION_TIME / drive.dt), len(drive) - 1) | 1
+    slow = drive.with_wind(uniform_filter1d(drive.wind, width, axis=0, mode="mirror"))
+    pulses, angles = replace(comparison, drive=slow, memory=None).signals(moving)
+    return Moving(moving, pulses, angles)
 
 
 def _debounced(recording: Recording) -> dict[str, Pulses]:

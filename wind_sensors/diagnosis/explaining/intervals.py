@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing import activity
 from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.terms import Interval
@@ -92,12 +92,7 @@ def cell_signatures(
     parts = []
     for channel in comparison.channels:
         name = channel.name
-        moved = comparison.masked(planted.series[name] - without.series[name])
-        if np.any(moved):
-            coefficients = spectra.to_cosine(inside * moved)[:, : comparison.coefficients]
-            parts.append(trust[name].slope * coefficients / trust[name].deviation)
-        else:
-            parts.append(np.zeros((cells, comparison.coefficients)))
+        parts.append(comparison.whitened_while(channel, without, planted, trust, inside))
     for channel in comparison.channels:
         name = channel.name
         moved = planted.statistics[name] - without.statistics[name]

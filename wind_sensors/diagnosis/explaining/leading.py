@@ -26,6 +26,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN, ONSET_SHARE
+from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -250,8 +251,8 @@ def held_throughout(
 
     A fit that has to find a large effect from a small one may go astray over the whole record and
     arrive in a part of it. An interval that the raw signals show by themselves stays unless the
-    whole record explains clearly more; and what would take away eddies that the signals have holds
-    in its part only.
+    whole record explains clearly more; and what would take away eddies that the signals have, or
+    what the raw signals rule out elsewhere, holds in its part only.
 
     Args:
         searcher: The search.
@@ -281,6 +282,7 @@ def held_throughout(
         if is_plausible(other.fit.terms[-1])
         and other.evidence < one.evidence + allowed
         and not calms_too_much(searcher, other, before)
+        and not ruled_out(searcher.comparison, searcher.station, other.fit.terms)
     ]
     return min(as_well, key=lambda other: other.evidence, default=one)
 

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.effects.platform import dead_log
+from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import headings
 from wind_sensors.station.model import Angle, Station
@@ -41,6 +43,11 @@ READ_INSIDE = 0.6
 """A vane that shows this share of the readings that a healthy one would have in the middle of a
 sector, and so many would have been there, has no gap there."""
 
+FROM_POSITIONS = 0.5
+LIVES = 20.0
+"""A platform's velocity is that of its positions from this share on. A log that is dead for a while
+is so for no more than this much longer [s]: it may be dying, or stand where nothing moves."""
+
 ONE_VALUE = np.radians(0.5)
 """Readings so close to the one value of a gap are that value [rad]."""
 
@@ -58,6 +65,7 @@ def ruled_out(comparison: Comparison, station: Station, terms: Sequence[Term]) -
         or _goes_on(comparison, term)
         or _hears_too_soon(comparison, term)
         or _is_silent(comparison, station, term, terms)
+        or _reports(comparison, term)
         for term in terms
     )
 
@@ -116,6 +124,26 @@ def _is_silent(
     heard = np.unique(heard) if term.values["dead_time"] > 0.0 else due
     lost = max(term.values["loss_probability"], 1e-12)
     return bool(heard.size >= FEWEST_DUE and heard.size * np.log(lost) < np.log(BY_CHANCE))
+
+
+def _reports(comparison: Comparison, term: Term) -> bool:
+    """Whether a log is said to be dead while it reports how fast the platform moves.
+
+    Positions tell as much of the velocity where the log lives, so that nothing else speaks against
+    it.
+
+    Args:
+        comparison: The recording.
+        term: Any effect; only a velocity taken from the positions is asked.
+    """
+    from_positions = term.values.get("position_share", 0.0)
+    if term.effect.name != "platform_velocity" or from_positions < FROM_POSITIONS:
+        return False
+    silent = dead_log(comparison.drive)
+    if silent is None:
+        return False
+    begin, end = window_of(comparison, term.interval)
+    return begin < silent[0] - LIVES or end > silent[1] + LIVES
 
 
 def _while_it_holds(comparison: Comparison, term: Term) -> tuple[FloatArray, FloatArray]:

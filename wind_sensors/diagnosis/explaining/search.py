@@ -148,7 +148,7 @@ class Searcher:
         )
         means = np.array([self.baseline.means.get(t.key, 0.0) for t in templates])
         signatures = self.bank.whitened(self.comparison, trust)
-        way = self.misplaced * self.comparison.weights(trust)
+        way = self.comparison.whitened_changes(self.misplaced, trust)
         lag = np.concatenate((lag_weights(self.comparison, templates) @ signatures, way))
         lively = shared_liveliness(self.comparison, trust, self.baseline.liveliness)
         further = [lag, lively, outage_signatures(self.comparison, trust, self.falling_silent)]

@@ -222,7 +222,7 @@ class SignatureBank:
 
     def whitened(self, comparison: Comparison, trust: Mapping[str, Trust]) -> FloatArray:
         """Noise-whitened signatures, one a row."""
-        return self._changed(comparison.channels) * comparison.weights(trust)
+        return comparison.whitened_changes(self._changed(comparison.channels), trust)
 
     def _changed(self, channels: tuple[Channel, ...]) -> FloatArray:
         """What each template changes in all coefficients and statistics, one a row."""

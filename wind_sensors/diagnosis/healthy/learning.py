@@ -94,7 +94,7 @@ def _low_ratios(
     for comparison in comparisons:
         simulated = comparison.simulate(station)
         trust = trust_of(comparison, simulated, baseline)[name]
-        residual = comparison.measured.cosine[name] - trust.slope * simulated.cosine[name]
+        residual = comparison.residual(simulated, name, trust.slope)
         edges = spectra.band_edges(residual.size)
         power = spectra.band_means(residual * residual, edges)
         length = comparison.grid.n * comparison.grid.dt

@@ -62,8 +62,7 @@ def residual_of(
     slope = spectra.shrinkage(
         coherence, known.exponent_at(coherence.frequency), comparison.coefficients
     )
-    residual = comparison.measured.cosine[channel.name] - slope * simulated.cosine[channel.name]
-    return coherence, slope, residual
+    return coherence, slope, comparison.residual(simulated, channel.name, slope)
 
 
 def _trust(
@@ -145,7 +144,7 @@ class Whitener:
 
     def of_changes(self, changes: FloatArray) -> FloatArray:
         """White signatures of changes of what is compared, one a row."""
-        return self.through_standing(changes * self.comparison.weights(self.trust))
+        return self.through_standing(self.comparison.whitened_changes(changes, self.trust))
 
     def deviance(self, simulated: Simulated) -> float:
         """Minus twice the log-likelihood of a simulation, but for a constant."""
@@ -197,6 +196,9 @@ def form_signatures(
     starts = np.concatenate(([0], np.cumsum(_lengths(comparison))))
     frequency = spectra.cosine_frequencies(comparison.grid.n, comparison.grid.dt)[:n]
     rows: list[FloatArray] = []
+    channels = comparison.channels
+    change = np.nan_to_num(corrected.flat(channels) - without.flat(channels))
+    whole_change = comparison.whitened_changes(change, trust)
 
     def add(place: int, values: FloatArray) -> None:
         if float(values @ values) < NEGLIGIBLE:
@@ -208,13 +210,11 @@ def form_signatures(
     for k, channel in enumerate(comparison.channels):
         name = channel.name
         t = trust[name]
-        scale = t.slope / t.deviation
-        change = corrected.series[name] - without.series[name]
-        if np.any(change):
+        if np.any(corrected.series[name] != without.series[name]):
             for weight in _wind_parts(comparison):
-                part = spectra.to_cosine(comparison.masked(change * weight))[:n]
-                add(k, FORM_ERROR * scale * part)
-            whole = scale * (corrected.cosine[name] - without.cosine[name])
+                part = comparison.whitened_while(channel, without, corrected, trust, weight)
+                add(k, FORM_ERROR * part)
+            whole = whole_change[k * n : (k + 1) * n]
             for low, high in itertools.pairwise(_FORM_BANDS):
                 add(k, np.where((frequency >= low) & (frequency < high), FORM_ERROR * whole, 0.0))
         shift = np.nan_to_num(

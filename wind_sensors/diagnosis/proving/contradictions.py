@@ -101,7 +101,7 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
     if len(naming.fit.terms) < 2:
         return False
     comparison = naming.whitener.comparison
-    weights = comparison.weights(naming.whitener.trust)
+    trust = naming.whitener.trust
     without = comparison.simulate(station).flat(comparison.channels)
 
     first, second = naming.fit.terms
@@ -111,7 +111,8 @@ def undo_each_other(naming: Naming, station: Station) -> bool:
         moved = comparison.possible(planted(station, terms))
         if moved is None:
             return False
-        change = np.nan_to_num(moved.flat(comparison.channels) - without) * weights
+        change = np.nan_to_num(moved.flat(comparison.channels) - without)
+        change = comparison.whitened_changes(change, trust)
         squares.append(np.bincount(comparison.part_of_each, change**2).astype(np.float64))
         in_quarters.append(_squares_in_quarters(comparison, change))
     changed, undone = _undone(squares, LEAST_CHANGE)
@@ -367,20 +368,19 @@ def _drop_by_sizes_on(
     if without is None:
         return 0.0
     change = naming.fit.simulated.flat(channels) - without.flat(channels)
-    change = np.nan_to_num(change) * null.comparison.weights(null.trust)
+    change = null.comparison.whitened_changes(np.nan_to_num(change), null.trust)
     each = np.array([np.where(place, change, 0.0) for place in places])
     return _drop_by_own_sizes(naming, each[np.any(each, axis=1)])
 
 
 def _put(part: FloatArray, naming: Naming, without: Simulated, k: int, weight: FloatArray) -> None:
     """Write what an effect changes on one channel, weighted in time, into a part of it."""
-    comparison = naming.adequate.comparison
-    name = comparison.channels[k].name
+    null = naming.adequate
+    comparison = null.comparison
     n = comparison.coefficients
-    change = (naming.fit.simulated.series[name] - without.series[name]) * weight
-    trust = naming.adequate.trust[name]
-    coefficients = spectra.to_cosine(comparison.masked(change))[:n]
-    part[k * n : (k + 1) * n] = trust.slope / trust.deviation * coefficients
+    part[k * n : (k + 1) * n] = comparison.whitened_while(
+        comparison.channels[k], without, naming.fit.simulated, null.trust, weight
+    )
 
 
 def _drop_by_own_sizes(naming: Naming, parts: FloatArray) -> float:

@@ -106,7 +106,7 @@ class Normal:
     def _trust(self, comparison: Comparison, simulated: Simulated, channel: Channel) -> Trust:
         state = self._of(comparison, simulated, channel)
         known = self.baseline.channels[channel.name]
-        expected = simulated.cosine[channel.name]
+        _, expected = comparison.beyond_motion(simulated, channel.name)
         edges, frequency = _bands(expected.size, comparison)
         m, c = state.measured / state.weight, state.cross / state.weight
         squared = np.clip(c * c / np.maximum(m, 1e-9), 0.0, 1.0)
@@ -144,8 +144,7 @@ class Normal:
         for channel in comparison.channels:
             state = self._of(comparison, simulated, channel)
             trust = trusts[channel.name]
-            expected = simulated.cosine[channel.name]
-            seen = comparison.measured.cosine[channel.name]
+            seen, expected = comparison.beyond_motion(simulated, channel.name)
             edges, _ = _bands(expected.size, comparison)
             levels = _levels(expected, edges)
             fade = 1.0 - 1.0 / _MEMORY
