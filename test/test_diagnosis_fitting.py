@@ -34,11 +34,11 @@ class Valley:
         self.channels = ()
         self.drive = SimpleNamespace(temperature=None, dt=1.0, elapsed=0.0)
 
-    def possible(self, station: Station, *_: Any) -> Any:
+    def possible(self, station: Station, *_: Any, **__: Any) -> Any:
         x = station.instruments[1].tilt_deg[0]
         wave = np.sin(1e3 * x)
         data = np.array([0.5 * (x - TRUE), self.ripple * wave])
-        return SimpleNamespace(flat=lambda channels: data)
+        return SimpleNamespace(flat=lambda channels, with_motion=True: data)
 
     def of(self, simulated: Any) -> FloatArray:
         return -np.asarray(simulated.flat(()))

@@ -11,9 +11,11 @@ import pytest
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.explaining.fitting import fit
+from wind_sensors.diagnosis.explaining.terms import planted, suggested
 from wind_sensors.diagnosis.healthy.baseline import Baseline, default_channel
-from wind_sensors.diagnosis.healthy.learning import learn
-from wind_sensors.diagnosis.healthy.whitening import residual_of
+from wind_sensors.diagnosis.healthy.learning import default_baseline, learn
+from wind_sensors.diagnosis.healthy.whitening import residual_of, trust_of, unstanding
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.estimation import process
 from wind_sensors.recordings.station_files import load_station
@@ -59,21 +61,33 @@ def test_a_flight_tells_the_inflow_of_its_rotors() -> None:
     assert found.verdict == "named"
     (finding,) = found.findings
     assert finding.term.key == ("rotor_downwash", "platform")
-    for key, planted in (("induced_velocity", 3.0), ("wake_skew", 0.3)):
+    for key, true in (("induced_velocity", 3.0), ("wake_skew", 0.3)):
         estimate = finding.parameters[key]
-        assert estimate.value == pytest.approx(planted, rel=0.2)
-        assert estimate.low < planted < estimate.high
+        assert estimate.value == pytest.approx(true, rel=0.2)
+        assert estimate.low < true < estimate.high
     assert finding.proof is not None
     assert finding.proof.excess_removed > 0.8
 
 
-def on_waves(seed: int, eddies: float) -> Recording:
-    """The ready boat under way in a steady breeze with so much turbulence."""
-    ready = load_station("usv")
+def usv() -> Station:
+    """The ready boat beside a reference."""
     reference = Reference(topic=Input(topic="/reference/wind"), separation=0.5)
+    return load_station("usv").model_copy(update={"reference": reference})
+
+
+def on_waves(seed: int, eddies: float, higher: float = 0.0) -> Recording:
+    """The boat under way in a steady breeze with so much turbulence.
+
+    Args:
+        seed: Of the eddies; the waves are always the same.
+        eddies: Intensity of the turbulence.
+        higher: The sensors are mounted so much higher than described [m].
+    """
+    arm = {"dx": 0.0, "dy": 0.0, "dz": higher}
+    sailing = with_effect(usv(), catalogue()["lever_arm"], "platform", arm)
     wind = isotropic_spec(8.0, eddies, 60.0, seed=seed)
     scenario = Scenario(wind, duration=600.0, seed=seed, trajectory=boat(seed=5))
-    return simulate(ready.model_copy(update={"reference": reference}), scenario)
+    return replace(simulate(sailing, scenario), station=usv())
 
 
 def test_waves_are_expected_in_full_where_the_references_eddies_are_not() -> None:
@@ -93,6 +107,19 @@ def test_waves_are_expected_in_full_where_the_references_eddies_are_not() -> Non
         assert np.mean(slope[here]) < 0.8
         share = float(of_waves @ left[here]) / float(of_waves @ of_waves)
         assert abs(share) < 0.1
+
+
+@pytest.mark.parametrize("seed", [1, 11])
+def test_a_lever_arm_is_as_long_as_it_is_where_the_reference_knows_no_eddy(seed: int) -> None:
+    reference = on_waves(seed + 1, 0.06).reference
+    comparison = prepare(replace(on_waves(seed, 0.06, higher=1.0), reference=reference))
+    arm = suggested("lever_arm", "platform", dx=0.0, dy=0.0, dz=1.0)
+    trust = trust_of(
+        comparison, comparison.simulate(planted(usv(), [arm])), default_baseline(usv())
+    )
+    short = replace(arm, values={**arm.values, "dz": 0.5})
+    found = fit(unstanding(comparison, trust), usv(), [short])
+    assert found.terms[0].values["dz"] == pytest.approx(1.0, abs=0.2)
 
 
 def test_an_effect_adds_to_what_a_station_already_states() -> None:

@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
 from wind_sensors.diagnosis.explaining.fitting import Fit
-from wind_sensors.diagnosis.explaining.guesses import guesses_of
+from wind_sensors.diagnosis.explaining.guesses import guesses_of, hidden_by_a_dead_log
 from wind_sensors.diagnosis.explaining.naming import (
     name,
     named_alone,
@@ -88,6 +88,7 @@ class Diagnosis:
 def _explained(
     comparison: Comparison,
     search: Callable[[Comparison], Searcher],
+    dead_log: Sequence[Term],
     report: Callable[[str], Callable[[float], None]],
 ) -> tuple[Searcher, Naming]:
     """The explanation of a recording, and the search that found it.
@@ -98,18 +99,24 @@ def _explained(
     Args:
         comparison: The recording.
         search: Prepares the search of a comparison.
+        dead_log: The motion that a log hides which does not go with the positions; empty: none.
         report: Gives a phase's progress function.
     """
-    searcher, first = _first_look(comparison, search)
 
-    def seen_moving(terms: Sequence[Term]) -> tuple[Searcher, Naming] | None:
-        moved = _moving(comparison, terms)
+    def seen_moving(
+        terms: Sequence[Term], other_speed: float = OTHER_SPEED
+    ) -> tuple[Searcher, Naming] | None:
+        moved = _moving(comparison, terms, other_speed)
         if moved is None:
             return None
         again, anew = _first_look(moved, search)
         naming = name(again, anew, report("fitting effects"))
         return (again, naming) if _motion(naming.fit.terms) else None
 
+    found = seen_moving(dead_log, 0.0)
+    if found is not None:
+        return found
+    searcher, first = _first_look(comparison, search)
     found = seen_moving(first.terms)
     if found is not None:
         return found
@@ -156,12 +163,15 @@ def _motion(terms: Sequence[Term]) -> list[Term]:
     return [term for term in terms if term.instrument == PLATFORM]
 
 
-def _moving(comparison: Comparison, terms: Sequence[Term]) -> Comparison | None:
+def _moving(
+    comparison: Comparison, terms: Sequence[Term], other_speed: float
+) -> Comparison | None:
     """The comparison with eddies measured by the wind that a wrong motion of the platform hid.
 
     Args:
         comparison: The recording.
         terms: What explains it.
+        other_speed: Share by which that wind differs at least.
 
     Returns:
         None: no motion is among it, or it makes no such difference.
@@ -172,7 +182,7 @@ def _moving(comparison: Comparison, terms: Sequence[Term]) -> Comparison | None:
     station = comparison.station
     moved = prepare(comparison.recording, station, comparison.place, planted(station, motion))
     change = np.abs(moved.speed - comparison.speed)
-    return moved if np.mean(change) > OTHER_SPEED * np.mean(comparison.speed) else None
+    return moved if np.mean(change) > other_speed * np.mean(comparison.speed) else None
 
 
 def _to_plant_on(baseline: Baseline, named: Sequence[Term]) -> Station:
@@ -258,7 +268,8 @@ def diagnose(
             seen, baseline, known, guesses, workers, report("simulating the catalogue")
         )
 
-    searcher, naming = _explained(comparison, search, report)
+    dead_log = [term for term in hidden_by_a_dead_log(comparison) if term.effect.name in known]
+    searcher, naming = _explained(comparison, search, dead_log, report)
     comparison = searcher.comparison
     judged = first_claim(
         searcher,

@@ -71,19 +71,20 @@ class Trust:
 
 @dataclass(frozen=True)
 class Moving:
-    """What the motion of a mount makes of its instruments' signals in a wind without eddies.
+    """A mount that moves, in a wind without eddies.
 
-    However little the reference tells of the eddies at the sensors, this is known, and expected in
-    full.
+    However little the reference tells of the eddies at the sensors, what the motion makes of the
+    signals is known, and expected in full.
 
     Attributes:
         station: The station, moving as it is believed to.
-        pulses, angles: Of its instruments in that wind.
+        drive: The recording's motion and air in such a wind.
+        memory: What instruments did in it.
     """
 
     station: Station
-    pulses: Mapping[str, Pulses]
-    angles: Mapping[str, Angles]
+    drive: Drive
+    memory: DriveMemory = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +106,7 @@ class Comparison(View):
         debounced: Pulses without bounces of the rotors whose contacts bounce. Bounces show one by
             one, so that the series, recorded and simulated, do without them; in the spectra and
             statistics they stay.
-        moving: What the mount's motion makes of the signals; None on a mast.
-        by_motion: What is seen of that.
+        moving: The mount that moves, in a wind without eddies; None on a mast.
     """
 
     recording: Recording
@@ -117,8 +117,10 @@ class Comparison(View):
     repeated: float = 0.0
     debounced: Mapping[str, Pulses] = field(default_factory=dict, repr=False)
     moving: Moving | None = field(default=None, repr=False)
-    by_motion: Simulated | None = field(default=None, repr=False, compare=False)
     _simulated: Memory = field(
+        default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
+    )
+    _in_slow_wind: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
     )
 
@@ -130,11 +132,7 @@ class Comparison(View):
     def measuring(self) -> Comparison:
         """The same comparison with what is seen of the recording."""
         pulses, angles = self.recording.pulses, self.recording.angles
-        measured = self.observe(pulses, angles, self.debounced)
-        if self.moving is None:
-            return replace(self, measured=measured)
-        by_motion = self.observe(self.moving.pulses, self.moving.angles)
-        return replace(self, measured=measured, by_motion=by_motion)
+        return replace(self, measured=self.observe(pulses, angles, self.debounced))
 
     def where_vanes_follow(self, explanations: Iterable[Simulated]) -> FloatArray:
         """Weights that are zero while a vane and one of its simulations turn round apart, (n,)."""
@@ -240,7 +238,11 @@ class Comparison(View):
         return response
 
     def simulate(
-        self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
+        self,
+        station: Station,
+        only: Collection[str] = (),
+        rest: Simulated | None = None,
+        with_motion: bool = True,
     ) -> Simulated:
         """Series and statistics of a station in this recording's wind.
 
@@ -248,42 +250,61 @@ class Comparison(View):
             station: The station.
             only: Instruments to simulate; empty: all.
             rest: Simulation to take the other instruments from.
+            with_motion: Tell apart what the known motion of the mount does.
         """
+        simulated = self._with_motion if with_motion else self._simulated_alone
         seen = self.unseen if rest is None else rest
         for channel in self.channels:
             if not only or channel.instrument in only:
-                seen = seen.with_others(self._simulated_alone(station, channel.instrument))
+                seen = seen.with_others(simulated(station, channel.instrument))
         return seen
 
     def possible(
-        self, station: Station, only: Collection[str] = (), rest: Simulated | None = None
+        self,
+        station: Station,
+        only: Collection[str] = (),
+        rest: Simulated | None = None,
+        with_motion: bool = True,
     ) -> Simulated | None:
         """The same; None for a station that cannot be (its rotor runs away, its log is absurd)."""
         try:
-            return self.simulate(station, only, rest)
+            return self.simulate(station, only, rest, with_motion)
         except (UserError, ValueError):
             return None
 
-    def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
+    def _with_motion(self, station: Station, instrument: str) -> Simulated:
         """Series and statistics of one instrument, and what the mount's motion makes of it."""
-        seen = self._observed_alone(station, instrument)
-        if self.moving is None or self.by_motion is None:
+        seen = self._simulated_alone(station, instrument)
+        if self.moving is None:
             return seen
+        # The instruments are those believed in: a second simulation of each is not worth its time.
         believed = self.moving.station
         others = tuple(c for c in believed.changes if c.instrument != PLATFORM)
         changes = (*others, *(c for c in station.changes if c.instrument == PLATFORM))
         moved = {"platform": station.platform, "changes": changes}
-        otherwise = believed.model_copy(update=moved)
+        series, cosine = self._by_motion(
+            believed.model_copy(update=moved), instrument, self.moving
+        )
         (name,) = seen.series
-        series, cosine = self.by_motion.series[name], self.by_motion.cosine[name]
-        if otherwise != believed:
-            # The eddies stay what they are: what changes is the motion's.
-            before, after = (self._observed_alone(s, instrument) for s in (believed, otherwise))
-            series = series + after.series[name] - before.series[name]
-            cosine = cosine + after.cosine[name] - before.cosine[name]
         return replace(seen, by_motion={name: series}, by_motion_cosine={name: cosine})
 
-    def _observed_alone(self, station: Station, instrument: str) -> Simulated:
+    def _by_motion(
+        self, station: Station, instrument: str, moving: Moving
+    ) -> tuple[FloatArray, FloatArray]:
+        """Series and coefficients of one instrument in a wind without eddies."""
+        (channel,) = (c for c in self.channels if c.instrument == instrument)
+
+        def course() -> tuple[FloatArray, FloatArray]:
+            slow = replace(self, drive=moving.drive, memory=moving.memory)
+            pulses, angles = slow.signals(station, (instrument,))
+            rotor = channel.kind == "rotor_rate"
+            return self.course_of(channel, pulses[instrument] if rotor else angles[instrument])
+
+        return self._in_slow_wind.of(
+            repr((instrument, station.platform, station.changes)), course
+        )
+
+    def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
         """Series and statistics of one instrument."""
         reaching = self._reaching(station, instrument)
         changes = tuple(c for c in station.changes if c.instrument in {*reaching, PLATFORM})

@@ -93,16 +93,24 @@ class Simulated:
         """Levels of a channel beyond their mean over the segments that count, flat."""
         return activity.contrasts(self.levels[channel], self.counted).ravel()
 
-    def flat(self, channels: Sequence[Channel]) -> FloatArray:
+    def flat(self, channels: Sequence[Channel], with_motion: bool = True) -> FloatArray:
         """What is compared: coefficients of all channels, all statistics, all activities, (l,).
 
         On a mount that moves, the coefficients that its motion makes follow.
+
+        Args:
+            channels: Of the comparison.
+            with_motion: Let them follow.
         """
         return np.concatenate(
             [self.cosine[c.name] for c in channels]
             + [self.statistics[c.name] for c in channels]
             + [self.activity(c.name) for c in channels]
-            + [self.by_motion_cosine[c.name] for c in channels if self.by_motion_cosine]
+            + [
+                self.by_motion_cosine[c.name]
+                for c in channels
+                if with_motion and self.by_motion_cosine
+            ]
         )
 
 
@@ -167,6 +175,23 @@ class View:
                 seen = seen.with_others(self._rotor(channel, pulses[name], on_average))
         return seen
 
+    def course_of(
+        self, channel: Channel, signals: Pulses | Angles
+    ) -> tuple[FloatArray, FloatArray]:
+        """The series of one channel alone, shape (n,), and its coefficients that are compared.
+
+        Args:
+            channel: What is looked at.
+            signals: Of its instrument.
+        """
+        if isinstance(signals, Pulses):
+            rotor = self.station.instrument(channel.instrument)
+            assert isinstance(rotor, Rotor)
+            series = rate_series(signals, rotor, self.grid)
+            return series, self._cosine(series)[: self.coefficients]
+        series = self._deviation(channel, signals) * self.speed
+        return series, spectra.to_cosine(self.masked(series))[: self.coefficients]
+
     def _rotor(self, channel: Channel, pulses: Pulses, on_average: Pulses | None) -> Simulated:
         rotor = self.station.instrument(channel.instrument)
         assert isinstance(rotor, Rotor)
@@ -205,9 +230,7 @@ class View:
 
     def _vane(self, channel: Channel, readings: Angles) -> Simulated:
         expected = self.expected.get(channel.name)
-        deviation = self._nearest_turn(
-            channel, angle_series(readings, self.direction, self.grid, expected)
-        )
+        deviation = self._deviation(channel, readings)
         angle = deviation + self.direction
         followed = (deviation if expected is None else expected) + self.direction
         statistics = (
@@ -220,6 +243,12 @@ class View:
         series = deviation * self.speed
         cosine = spectra.to_cosine(self.masked(series))
         return self._of_one(channel, series, cosine, statistics, series)
+
+    def _deviation(self, channel: Channel, readings: Angles) -> FloatArray:
+        """Deviation of a vane from the slow direction [rad], shape (n,)."""
+        expected = self.expected.get(channel.name)
+        turned = angle_series(readings, self.direction, self.grid, expected)
+        return self._nearest_turn(channel, turned)
 
     def _of_one(
         self,

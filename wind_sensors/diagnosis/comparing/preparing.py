@@ -26,7 +26,7 @@ from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.comparing.spectra import quick_length
 from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
 from wind_sensors.errors import UserError
-from wind_sensors.simulation.drive import drive_from_recording
+from wind_sensors.simulation.drive import Drive, drive_from_recording
 from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.doubles import without_doubles
@@ -143,7 +143,7 @@ def prepare(
     )
     simulated, angles = comparison.signals(believed)
     if drive.motion is not None:
-        comparison = replace(comparison, moving=_in_slow_wind(comparison, believed))
+        comparison = replace(comparison, moving=_in_slow_wind(drive, believed))
     turning = _where_rotors_turn(comparison, simulated)
     comparison = replace(
         comparison,
@@ -162,13 +162,11 @@ def prepare(
     return comparison.measuring()
 
 
-def _in_slow_wind(comparison: Comparison, moving: Station) -> Moving:
-    """What the motion of a station makes of its signals."""
-    drive = comparison.drive
+def _in_slow_wind(drive: Drive, moving: Station) -> Moving:
+    """A station that moves, in the slow wind of a drive."""
     width = min(int(DIRECTION_TIME / drive.dt), len(drive) - 1) | 1
     slow = drive.with_wind(uniform_filter1d(drive.wind, width, axis=0, mode="mirror"))
-    pulses, angles = replace(comparison, drive=slow, memory=None).signals(moving)
-    return Moving(moving, pulses, angles)
+    return Moving(moving, slow, DriveMemory(slow))
 
 
 def _debounced(recording: Recording) -> dict[str, Pulses]:

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
@@ -20,6 +21,8 @@ from wind_sensors.station.model import (
 
 Entry = Instrument | Platform
 
+FloatArray = npt.NDArray[np.float64]
+
 DEAD_SHARE = 0.2
 """A log that shows less than this share of what the positions' change shows is dead."""
 
@@ -31,6 +34,11 @@ LEAST_TRAVEL = 0.5
 
 DEAD_SHORTEST = 60.0
 """A log that is silent for less [s] is not held to be dead."""
+
+LIVING_SHARE = 0.5
+SHORTEST_LIFE = 20.0
+"""A log is alive that shows at least this share of what the positions' change shows, for so long
+altogether [s]."""
 
 MISSING_SHARE = 0.5
 """Smallest share of the carrier's velocity that counts as not removed; what lacks less is a wrong
@@ -47,12 +55,8 @@ def _is_platform(entry: Entry, station: Station) -> bool:
     return isinstance(entry, Platform)
 
 
-def dead_log(drive: Drive) -> tuple[float, float] | None:
-    """Where the positions move and the reported velocity does not, for the longest time.
-
-    Returns:
-        Begin and end [s since the drive's first instant]; None: nowhere.
-    """
+def _speeds(drive: Drive) -> tuple[FloatArray, FloatArray] | None:
+    """Reported speed and that of the positions [m/s], shape (n,) each; None: they are not known."""
     motion = drive.motion
     if motion is None or motion.travel is None:
         return None
@@ -61,6 +65,19 @@ def dead_log(drive: Drive) -> tuple[float, float] | None:
         np.sqrt(np.maximum(uniform_filter1d(np.sum(v * v, axis=1), wide, mode="nearest"), 0.0))
         for v in (motion.velocity, motion.travel)
     )
+    return reported, moved
+
+
+def dead_log(drive: Drive) -> tuple[float, float] | None:
+    """Where the positions move and the reported velocity does not, for the longest time.
+
+    Returns:
+        Begin and end [s since the drive's first instant]; None: nowhere.
+    """
+    speeds = _speeds(drive)
+    if speeds is None:
+        return None
+    reported, moved = speeds
     dead = (moved > LEAST_TRAVEL) & (reported < DEAD_SHARE * moved)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], dead, [False])).astype(int)))
     if edges.size == 0:
@@ -69,6 +86,21 @@ def dead_log(drive: Drive) -> tuple[float, float] | None:
     longest = int(np.argmax(ends - begins))
     begin, end = float(begins[longest] * drive.dt), float(ends[longest] * drive.dt)
     return (begin, end) if end - begin > DEAD_SHORTEST else None
+
+
+def log_lives(drive: Drive, begin: float, end: float) -> bool:
+    """Whether the reported velocity goes with the positions' for a while.
+
+    Args:
+        drive: Holds both.
+        begin, end: Where [s since the drive's first instant].
+    """
+    speeds = _speeds(drive)
+    if speeds is None:
+        return False
+    reported, moved = (speed[int(begin / drive.dt) : int(end / drive.dt) + 1] for speed in speeds)
+    living = (moved > LEAST_TRAVEL) & (reported > LIVING_SHARE * moved)
+    return bool(drive.dt * np.count_nonzero(living) > SHORTEST_LIFE)
 
 
 def log_is_dead(drive: Drive) -> bool:

@@ -176,24 +176,32 @@ class Problem:
         """
         columns = [] if carried is None else list(carried.T)
         first = len(columns)
-        for k, (_, parameter) in list(enumerate(_parameters(self._terms)))[first:]:
+        for k, (owner, parameter) in list(enumerate(_parameters(self._terms)))[first:]:
             step = parameter.difference if steps is None else float(steps[k])
             if not low[k] <= values[k] + step <= high[k]:
                 step = -step
             moved = values.copy()
             moved[k] = min(max(values[k] + step, low[k]), high[k])
             shift = (moved[k] - values[k]) / parameter.difference
-            simulated = self._possible(moved) if shift != 0.0 else None
+            simulated = self._nearby(moved) if shift != 0.0 else None
             if simulated is None:
                 columns.append(np.zeros_like(base))
             else:
-                columns.append(self._change(base, simulated) / shift)
+                of_platform = self._terms[owner].instrument == PLATFORM
+                columns.append(self._slight_change(base, simulated, of_platform) / shift)
         return np.asarray(np.array(columns).T, dtype=np.float64)
 
     def _possible(self, values: FloatArray) -> Simulated | None:
         """Simulation with given parameters; None where the station is impossible."""
         self.evaluations += 1
         return self._whitener.comparison.possible(self._tried(values), self._only, self._rest)
+
+    def _nearby(self, values: FloatArray) -> Simulated | None:
+        """The same, without telling apart what the motion of the mount does."""
+        self.evaluations += 1
+        return self._whitener.comparison.possible(
+            self._tried(values), self._only, self._rest, with_motion=False
+        )
 
     def compared(self, simulated: Simulated) -> FloatArray:
         """What is compared of a simulation, shape (l,)."""
@@ -205,6 +213,19 @@ class Problem:
 
     def _change(self, base: FloatArray, moved: Simulated) -> FloatArray:
         return np.asarray(np.nan_to_num(self.compared(moved) - base))
+
+    def _slight_change(
+        self, base: FloatArray, moved: Simulated, of_platform: bool
+    ) -> FloatArray:
+        """How far what is compared moves by a slight change, shape (l,).
+
+        The eddies stay what they are: what a slight change of the platform does, its motion does.
+        """
+        compared = moved.flat(self._whitener.comparison.channels, with_motion=False)
+        change = np.nan_to_num(compared - base[: compared.size])
+        by_motion = base.size - compared.size
+        known = change[:by_motion] if of_platform else np.zeros(by_motion)
+        return np.concatenate((change, known))
 
     def whitened(self, slopes: FloatArray) -> FloatArray:
         """Derivatives of the white vector, shape (m, parameters)."""

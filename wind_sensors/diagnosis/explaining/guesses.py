@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
-from wind_sensors.diagnosis.effects.platform import dead_log
-from wind_sensors.diagnosis.explaining.intervals import interval_of
+from wind_sensors.diagnosis.effects.platform import dead_log, log_lives
+from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
 from wind_sensors.diagnosis.explaining.jumps import late_stamps
 from wind_sensors.diagnosis.explaining.rotor_guesses import rotor_guesses
 from wind_sensors.diagnosis.explaining.terms import Term, suggested
@@ -42,13 +42,22 @@ DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 other, and nothing shows the way."""
 
 
+def hidden_by_a_dead_log(comparison: Comparison) -> list[Term]:
+    """The motion that a log does not report while the positions change; empty: it reports all."""
+    silent = dead_log(comparison.drive)
+    if silent is None:
+        return []
+    still = suggested("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
+    if log_lives(comparison.drive, *window_of(comparison, still.interval)):
+        still = replace(still, interval=interval_of(comparison, *silent))
+    return [still]
+
+
 def guesses_of(comparison: Comparison, station: Station) -> Guesses:
     """Effects that the raw signals suggest, with starting values, by effect and instrument."""
     out: Guesses = {}
-    silent = dead_log(comparison.drive)
-    if silent is not None:
-        still = suggested("platform_velocity", PLATFORM, velocity_share=1.0, position_share=1.0)
-        out[still.key] = [replace(still, interval=interval_of(comparison, *silent))]
+    for still in hidden_by_a_dead_log(comparison):
+        out[still.key] = [still]
     leans = [
         suggested(
             "axis_tilt", STATION, tilt_x=LEAN * np.cos(towards), tilt_y=LEAN * np.sin(towards)

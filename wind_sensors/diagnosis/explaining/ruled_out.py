@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.effects.platform import dead_log
+from wind_sensors.diagnosis.effects.platform import log_is_dead, log_lives
 from wind_sensors.diagnosis.explaining.intervals import window_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
 from wind_sensors.diagnosis.explaining.vane_guesses import headings
@@ -44,9 +44,7 @@ READ_INSIDE = 0.6
 sector, and so many would have been there, has no gap there."""
 
 FROM_POSITIONS = 0.5
-LIVES = 20.0
-"""A platform's velocity is that of its positions from this share on. A log that is dead for a while
-is so for no more than this much longer [s]: it may be dying, or stand where nothing moves."""
+"""A platform's velocity is that of its positions from this share on."""
 
 ONE_VALUE = np.radians(0.5)
 """Readings so close to the one value of a gap are that value [rad]."""
@@ -139,11 +137,9 @@ def _reports(comparison: Comparison, term: Term) -> bool:
     from_positions = term.values.get("position_share", 0.0)
     if term.effect.name != "platform_velocity" or from_positions < FROM_POSITIONS:
         return False
-    silent = dead_log(comparison.drive)
-    if silent is None:
+    if not log_is_dead(comparison.drive):
         return False
-    begin, end = window_of(comparison, term.interval)
-    return begin < silent[0] - LIVES or end > silent[1] + LIVES
+    return log_lives(comparison.drive, *window_of(comparison, term.interval))
 
 
 def _while_it_holds(comparison: Comparison, term: Term) -> tuple[FloatArray, FloatArray]:
