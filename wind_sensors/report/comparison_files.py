@@ -40,7 +40,10 @@ def unread(comparison: Comparison) -> list[str]:
 
 
 def channel_summary(comparison: Comparison, simulated: Simulated) -> list[dict[str, Any]]:
-    """Mean, scatter and coherence of each channel's recorded minus simulated series."""
+    """Mean and scatter of each channel's recorded minus simulated series, and their coherence.
+
+    On a mount that moves the coherence is that of what the wind does beyond the known motion.
+    """
     out = []
     for channel in comparison.channels:
         residual = (
