@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import activity, spectra
+from wind_sensors.diagnosis.comparing.moving import Moving
 from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated, View
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
@@ -67,24 +68,6 @@ class Trust:
     statistics_mean: FloatArray
     statistics_deviation: FloatArray
     activity_deviation: FloatArray
-
-
-@dataclass(frozen=True)
-class Moving:
-    """A mount that moves, in a wind without eddies.
-
-    However little the reference tells of the eddies at the sensors, what the motion makes of the
-    signals is known, and expected in full.
-
-    Attributes:
-        station: The station, moving as it is believed to.
-        drive: The recording's motion and air in such a wind.
-        memory: What instruments did in it.
-    """
-
-    station: Station
-    drive: Drive
-    memory: DriveMemory = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -427,7 +410,7 @@ class Comparison(View):
 
         Args:
             changes: Of `Simulated.flat`, one change or one a row, shape (..., l) and on a mount
-                that moves (..., l + coefficients).
+                that moves (..., l + coefficients of all channels).
             trust: Noise of each channel.
 
         Returns:
@@ -447,7 +430,7 @@ class Comparison(View):
         without: Simulated,
         corrected: Simulated,
         trust: Mapping[str, Trust],
-        while_: FloatArray,
+        weights: FloatArray,
     ) -> FloatArray:
         """Whitened coefficients of what changes in one channel, weighted in time.
 
@@ -455,7 +438,7 @@ class Comparison(View):
             channel: Of the comparison.
             without, corrected: Simulations before and after.
             trust: Noise of each channel.
-            while_: Weights of the bins, shape (..., n).
+            weights: Weights of the bins, shape (..., n).
 
         Returns:
             Shape (..., coefficients).
@@ -464,11 +447,11 @@ class Comparison(View):
         t = trust[name]
         changed = self.masked(corrected.series[name] - without.series[name])
         if not np.any(changed):
-            return np.zeros((*while_.shape[:-1], self.coefficients))
-        whitened = t.slope * spectra.to_cosine(while_ * changed)[..., : self.coefficients]
+            return np.zeros((*weights.shape[:-1], self.coefficients))
+        whitened = t.slope * spectra.to_cosine(weights * changed)[..., : self.coefficients]
         if name in without.by_motion:
             moved = self.masked(corrected.by_motion[name] - without.by_motion[name])
-            share = (1.0 - t.slope) * spectra.to_cosine(while_ * moved)[..., : self.coefficients]
+            share = (1.0 - t.slope) * spectra.to_cosine(weights * moved)[..., : self.coefficients]
             whitened = whitened + share
         return np.asarray(whitened / t.deviation)
 

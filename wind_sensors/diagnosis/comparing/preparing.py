@@ -11,8 +11,9 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
-from wind_sensors.diagnosis.comparing.comparison import Comparison, Moving
+from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.counted_time import where_reference_is, without_repeats
+from wind_sensors.diagnosis.comparing.moving import in_slow_wind
 from wind_sensors.diagnosis.comparing.observation import (
     SERIES_INTERVAL,
     Grid,
@@ -26,7 +27,7 @@ from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.comparing.spectra import quick_length
 from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes_follow
 from wind_sensors.errors import UserError
-from wind_sensors.simulation.drive import Drive, drive_from_recording
+from wind_sensors.simulation.drive import drive_from_recording
 from wind_sensors.simulation.memory import DriveMemory
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.doubles import without_doubles
@@ -143,7 +144,7 @@ def prepare(
     )
     simulated, angles = comparison.signals(believed)
     if drive.motion is not None:
-        comparison = replace(comparison, moving=_in_slow_wind(drive, believed))
+        comparison = replace(comparison, moving=in_slow_wind(drive, believed, DIRECTION_TIME))
     turning = _where_rotors_turn(comparison, simulated)
     comparison = replace(
         comparison,
@@ -160,13 +161,6 @@ def prepare(
     if not known_wind.all() or not followed.all():
         return comparison.within(known_wind * followed)
     return comparison.measuring()
-
-
-def _in_slow_wind(drive: Drive, moving: Station) -> Moving:
-    """A station that moves, in the slow wind of a drive."""
-    width = min(int(DIRECTION_TIME / drive.dt), len(drive) - 1) | 1
-    slow = drive.with_wind(uniform_filter1d(drive.wind, width, axis=0, mode="mirror"))
-    return Moving(moving, slow, DriveMemory(slow))
 
 
 def _debounced(recording: Recording) -> dict[str, Pulses]:
