@@ -35,7 +35,7 @@ def _kernel_folder(package: Path) -> str:
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
-        if b"@compiled" in text:
+        if b"@compiled" in text or b"@inlined" in text:
             digest.update(path.relative_to(package).as_posix().encode())
             digest.update(text)
     name = f"kernels-{digest.hexdigest()[:16]}"
@@ -68,8 +68,12 @@ def is_kept(kernel: Callable[..., Any]) -> bool:
     return folder != "" and any(Path(folder).rglob(f"{file}.{function.__qualname__}-*.nbi"))
 
 
-def compiled(function: _Function) -> _Function:
+def compiled(function: _Function, inline: bool = False) -> _Function:
     """Compile a numeric kernel to machine code, keeping its type signature.
+
+    Args:
+        function: Of numbers and arrays.
+        inline: Whether its machine code stands where other kernels call it.
 
     The machine code is kept between runs, so that only the first run after an installation pays
     for the compilation. Floating-point semantics stay strict (no reassociation), because the same
@@ -79,6 +83,12 @@ def compiled(function: _Function) -> _Function:
     before = settings.CACHE_DIR
     settings.CACHE_DIR = _kernel_folder(_package_of(function))
     try:
-        return cast(_Function, numba.njit(cache=True, error_model="numpy")(function))
+        compile_it = numba.njit(cache=True, error_model="numpy", forceinline=inline)
+        return cast(_Function, compile_it(function))
     finally:
         settings.CACHE_DIR = before
+
+
+def inlined(function: _Function) -> _Function:
+    """As `compiled`, of a small kernel in others' loops."""
+    return compiled(function, True)

@@ -115,7 +115,7 @@ class WindAtSensors:
         self._station = station
         self._drive = drive
         self._memory = DriveMemory(drive) if memory is None else memory
-        self._carrier = (part, repr(station.platform))
+        self._carrier = (part, station.platform)
         self._platform: Platform | None = None
         if drive.motion is not None:
             self._platform = station.platform or Platform()
@@ -153,7 +153,7 @@ class WindAtSensors:
         tilt = (instrument.tilt_deg[0] + lean[0], instrument.tilt_deg[1] + lean[1])
         own = (instrument.position, instrument.wake_shadows, instrument.flow_distortion)
         heading = self._station.sensor_heading_deg
-        return self._carrier, heading, repr(own), tilt, _weighs(instrument)
+        return self._carrier, heading, own, tilt, _weighs(instrument)
 
     def _lever_arm(self, position: tuple[float, float, float]) -> FloatArray:
         """The instrument's place in platform axes [m]."""
@@ -167,7 +167,7 @@ class WindAtSensors:
         if motion is None or platform is None:
             return self._drive.wind
         return self._memory.flows.of(
-            ("felt", self._carrier, repr(position)),
+            ("felt", self._carrier, position),
             lambda: self._felt(motion, platform, position),
         )
 

@@ -284,15 +284,16 @@ class Comparison(View):
             return self.course_of(channel, pulses[instrument] if rotor else angles[instrument])
 
         return self._in_slow_wind.of(
-            repr((instrument, station.platform, station.changes)), course
+            (instrument, station.platform, repr(station.changes)), course
         )
 
     def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
         """Series and statistics of one instrument."""
         reaching = self._reaching(station, instrument)
         changes = tuple(c for c in station.changes if c.instrument in {*reaching, PLATFORM})
-        parts = [station.instrument(name) for name in reaching]
-        key = repr((instrument, parts, station.platform, station.sensor_heading_deg, changes))
+        parts = tuple(station.instrument(name) for name in reaching)
+        heading = station.sensor_heading_deg
+        key = (instrument, parts, station.platform, heading, repr(changes))
         alone = station.model_copy(update={"changes": changes})
         if not self._by_chance(alone, instrument):
             return self._simulated.of(

@@ -124,14 +124,18 @@ def window_starts(
     Returns:
         Starting points of the most promising, several for each.
     """
-    bank = searcher.probes
     always = {(s.effect, s.instrument): s.gain for s in searcher.scores(whitener, vector)}
     cuts = _screening_cuts(searcher)
-    found: dict[Key, tuple[float, list[Term]]] = {}
-    for (key, multiple), members in group_sizes(bank.templates).items():
+    groups = [
+        (key, multiple, members)
+        for (key, multiple), members in group_sizes(searcher.probes.templates).items()
+        if key not in used and not searcher.effects[key[0]].legible
+    ]
+
+    def starts_of(group: tuple[Key, float, list[int]]) -> tuple[float, list[Term]] | None:
+        key, multiple, members = group
+        bank = searcher.probes
         effect = searcher.effects[key[0]]
-        if key in used or effect.legible:
-            continue
         cells = [
             whitener.through_standing(
                 cell_signatures(
@@ -146,7 +150,7 @@ def window_starts(
         if span is None or span.gain < max(
             always.get(key, 0.0) + advantage, LEAST_WINDOW_GAIN
         ):
-            continue
+            return None
         amplitudes = {
             bank.templates[k].number: multiple * float(a)
             for k, a in zip(members, span.amplitudes, strict=True) if a != 0.0
@@ -158,8 +162,13 @@ def window_starts(
         interval = interval_of(searcher.comparison, *span.window)
         starts = [Term(effect, key[1], starting_values(score, searcher.comparison.drive), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
-        if key not in found or span.net > found[key][0]:
-            found[key] = (span.net, starts)
+        return span.net, starts
+
+    found: dict[Key, tuple[float, list[Term]]] = {}
+    each = in_parallel(starts_of, groups, searcher.workers, work=lambda group: len(group[2]))
+    for (key, _, _), one in zip(groups, each, strict=True):
+        if one is not None and (key not in found or one[0] > found[key][0]):
+            found[key] = one
     ranked = sorted(found.values(), key=lambda pair: -pair[0])
     return [starts for _, starts in ranked[:WINDOW_CANDIDATES]]
 

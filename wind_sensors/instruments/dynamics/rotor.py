@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.compiled import compiled
+from wind_sensors.compiled import compiled, inlined
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -164,9 +164,22 @@ def bearing_friction(p: RotorParameters, y: float, temperature: float) -> float:
 
     It stiffens with cold, and falls from `breakaway` times its size at rest (Stribeck's curve).
     """
-    friction = p.friction * math.exp(
+    return _at_rate(p, y, _friction_of_fast(p, temperature))
+
+
+@inlined
+def _friction_of_fast(p: RotorParameters, temperature: float) -> float:
+    """Friction of a rotor that turns fast [m^2/s^2]."""
+    if p.friction == 0.0:
+        return 0.0
+    return p.friction * math.exp(
         p.friction_temperature_coefficient * (temperature - p.reference_temperature)
     )
+
+
+@inlined
+def _at_rate(p: RotorParameters, y: float, friction: float) -> float:
+    """Friction at a rate y [m/s], given that of a rotor that turns fast."""
     if p.breakaway == 1.0:
         return friction
     slow = math.exp(-(y / STRIBECK_SPEED) * (y / STRIBECK_SPEED))
@@ -189,28 +202,47 @@ def rotor_acceleration(
 
     A rotor at rest stays at rest while the aerodynamic torque does not exceed the friction.
     """
+    friction = _friction_of_fast(p, temperature) / density_ratio
+    pace = density_ratio / (p.distance_constant * p.inertia_factor)
+    return _acceleration(p, y, psi - lateral_angle, forcing, slope, lift, friction, pace)
+
+
+@inlined
+def _acceleration(
+    p: RotorParameters,
+    y: float,
+    psi: float,
+    forcing: float,
+    slope: float,
+    lift: float,
+    friction: float,
+    pace: float,
+) -> float:
+    """dy/dt [m/s^2].
+
+    Args:
+        p: Constants of the rotor.
+        y: l s [m/s].
+        psi: Rotor angle from the transverse wind [rad].
+        forcing, slope, lift: A, B [m/s] and E [m^2/s^2].
+        friction: Of a rotor that turns fast, over the density ratio [m^2/s^2].
+        pace: Density ratio over the length in which the rotor answers [1/m].
+    """
     torque = (forcing - y) * (p.a4 * slope + (1.0 - p.a4) * y) + lift
     if p.torque_harmonic != 0.0:
-        torque += (
-            p.torque_harmonic
-            * forcing
-            * forcing
-            * math.cos(psi - lateral_angle - p.torque_harmonic_phase)
-        )
-    torque *= density_ratio
-    friction = bearing_friction(p, y, temperature)
+        strong = math.cos(psi - p.torque_harmonic_phase)
+        torque += p.torque_harmonic * forcing * forcing * strong
+    held = _at_rate(p, y, friction)
     if y > 0.0:
-        torque -= friction
-    elif y < 0.0:
-        torque += friction
-    elif abs(torque) <= friction:
-        torque = 0.0
-    else:
-        torque -= math.copysign(friction, torque)
-    return torque / (p.distance_constant * p.inertia_factor)
+        return pace * (torque - held)
+    if y < 0.0:
+        return pace * (torque + held)
+    if abs(torque) <= held:
+        return 0.0
+    return pace * (torque - math.copysign(held, torque))
 
 
-@compiled
+@inlined
 def _not_beyond_rest(reached: float, y: float, friction: float) -> float:
     """A stage of a step that friction ends at rest: there its torque would turn round."""
     return 0.0 if friction > 0.0 and y != 0.0 and reached * y < 0.0 else reached
@@ -287,6 +319,8 @@ def advance_forced(
     turn = lateral_1 - lateral_0
     turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
     inverse_length = 1.0 / p.calibration_distance
+    friction = _friction_of_fast(p, temperature) / density_ratio
+    pace = density_ratio / (p.distance_constant * p.inertia_factor)
     for k in range(substeps):
         f_0 = k / substeps
         f_h = (k + 0.5) / substeps
@@ -297,21 +331,21 @@ def advance_forced(
         a_h = a_0 + f_h * (a_1 - a_0)
         b_h = b_0 + f_h * (b_1 - b_0)
         e_h = e_0 + f_h * (e_1 - e_0)
-        k_1 = rotor_acceleration(
-            p, y, psi, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0),
-            e_0 + f_0 * (e_1 - e_0), l_0, density_ratio, temperature,
+        k_1 = _acceleration(
+            p, y, psi - l_0, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0),
+            e_0 + f_0 * (e_1 - e_0), friction, pace,
         )  # fmt: skip
         y_2 = _not_beyond_rest(y + 0.5 * step * k_1, y, p.friction)
         psi_2 = psi + 0.5 * step * y * inverse_length
-        k_2 = rotor_acceleration(p, y_2, psi_2, a_h, b_h, e_h, l_h, density_ratio, temperature)
+        k_2 = _acceleration(p, y_2, psi_2 - l_h, a_h, b_h, e_h, friction, pace)
         y_3 = _not_beyond_rest(y + 0.5 * step * k_2, y, p.friction)
         psi_3 = psi + 0.5 * step * y_2 * inverse_length
-        k_3 = rotor_acceleration(p, y_3, psi_3, a_h, b_h, e_h, l_h, density_ratio, temperature)
+        k_3 = _acceleration(p, y_3, psi_3 - l_h, a_h, b_h, e_h, friction, pace)
         y_4 = _not_beyond_rest(y + step * k_3, y, p.friction)
         psi_4 = psi + step * y_3 * inverse_length
-        k_4 = rotor_acceleration(
-            p, y_4, psi_4, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
-            e_0 + f_1 * (e_1 - e_0), l_1, density_ratio, temperature,
+        k_4 = _acceleration(
+            p, y_4, psi_4 - l_1, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
+            e_0 + f_1 * (e_1 - e_0), friction, pace,
         )  # fmt: skip
         y_next = y + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
         psi += step / 6.0 * (y + 2.0 * y_2 + 2.0 * y_3 + y_4) * inverse_length

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.compiled import compiled
+from wind_sensors.compiled import compiled, inlined
 from wind_sensors.instruments.dynamics.rotor import RotorParameters
 from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
 
@@ -71,25 +71,79 @@ def vane_acceleration(
 
     The restoring term is written as h (h sin(phi - alpha)), which needs no direction of the wind.
     """
-    h = math.sqrt(wind_x * wind_x + wind_y * wind_y)
-    force = density_ratio / (1.0 + p.softness * h * h)
-    pace = force / p.inertia_factor * h / p.distance_constant
     balanced = phi - p.aerodynamic_offset
     across = wind_y * math.cos(balanced) - wind_x * math.sin(balanced)
-    restoring = pace * across / p.distance_constant
-    damping = 2.0 * p.damping_ratio * p.damping_factor * pace * (phi_rate + yaw_rate)
-    damping += p.viscosity / p.inertia_factor * phi_rate
-    gravity = 0.0
-    if p.imbalance != 0.0:
-        gravity = (
-            p.imbalance
-            / p.inertia_factor
-            * (-gravity_x * math.sin(phi) + gravity_y * math.cos(phi))
-        )
-    return -damping - restoring - yaw_acceleration + gravity
+    speed = math.hypot(wind_x, wind_y)
+    pull = _pull(p, phi, gravity_x, gravity_y)
+    pace = density_ratio / (p.inertia_factor * p.distance_constant)
+    return _acceleration(
+        p, phi_rate, speed, across, phi_rate + yaw_rate, pull - yaw_acceleration, pace
+    )
 
 
-@compiled
+@inlined
+def _acceleration(
+    p: VaneParameters,
+    phi_rate: float,
+    speed: float,
+    across: float,
+    air_turn: float,
+    pushed: float,
+    pace: float,
+) -> float:
+    """phi'' [rad/s^2] without friction.
+
+    Args:
+        p: Constants of the vane.
+        phi_rate: Turning rate against the mount [rad/s].
+        speed: Of the wind across the vane's axis, h [m/s].
+        across: Wind across the heading at which the fin balances, h sin(phi - alpha) [m/s].
+        air_turn: Turning rate against the air [rad/s].
+        pushed: Angular acceleration by gravity and by the mount [rad/s^2].
+        pace: Air density over inertia and distance constant [1/m].
+    """
+    if p.softness > 0.0:
+        pace /= 1.0 + p.softness * speed * speed
+    held = pace * speed
+    damping = 2.0 * p.damping_ratio * p.damping_factor * held * air_turn
+    if p.viscosity > 0.0:
+        damping += p.viscosity / p.inertia_factor * phi_rate
+    return pushed - damping - held / p.distance_constant * across
+
+
+@inlined
+def _pull(p: VaneParameters, phi: float, gravity_x: float, gravity_y: float) -> float:
+    """Angular acceleration of a vane out of balance [rad/s^2]."""
+    if p.imbalance == 0.0:
+        return 0.0
+    across = gravity_y * math.cos(phi) - gravity_x * math.sin(phi)
+    return p.imbalance / p.inertia_factor * across
+
+
+_SMALL_TURN = 0.25
+"""Up to this angle [rad] the series of `_small_turn` hold to the last digit."""
+
+
+@inlined
+def _small_turn(angle: float) -> tuple[float, float]:
+    """Cosine and sine of a small angle [rad].
+
+    A library's functions take so long that each stage of a step would wait for them.
+    """
+    if abs(angle) > _SMALL_TURN:
+        return math.cos(angle), math.sin(angle)
+    q = angle * angle
+    r = q * q
+    cosine = (1.0 - q / 2.0) + r * (
+        (1.0 / 24.0 - q * (1.0 / 720.0)) + r * (1.0 / 40320.0 - q * (1.0 / 3628800.0))
+    )
+    sine = (1.0 - q * (1.0 / 6.0)) + r * (
+        (1.0 / 120.0 - q * (1.0 / 5040.0)) + r * (1.0 / 362880.0 - q * (1.0 / 39916800.0))
+    )
+    return cosine, angle * sine
+
+
+@inlined
 def _grip(p: VaneParameters, phi: float) -> float:
     """Angular acceleration that the friction withstands at a heading [rad/s^2]."""
     friction = p.friction
@@ -136,6 +190,9 @@ def advance_vane(
         substeps = max(substeps, 4)
     step = dt / substeps
     yaw_acceleration = (yaw_rate[1] - yaw_rate[0]) / dt
+    pace = density_ratio / (p.inertia_factor * p.distance_constant)
+    c = math.cos(phi - p.aerodynamic_offset)
+    s = math.sin(phi - p.aerodynamic_offset)
     for k in range(substeps):
         friction = _grip(p, phi)
         f_0 = k / substeps
@@ -147,14 +204,15 @@ def advance_vane(
         y_h = wind_y[0] + f_h * (wind_y[1] - wind_y[0])
         x_1 = wind_x[0] + f_1 * (wind_x[1] - wind_x[0])
         y_1 = wind_y[0] + f_1 * (wind_y[1] - wind_y[0])
+        h_0 = math.sqrt(x_0 * x_0 + y_0 * y_0)
+        h_h = math.sqrt(x_h * x_h + y_h * y_h)
+        h_1 = math.sqrt(x_1 * x_1 + y_1 * y_1)
         turn_0 = yaw_rate[0] + f_0 * (yaw_rate[1] - yaw_rate[0])
         turn_h = yaw_rate[0] + f_h * (yaw_rate[1] - yaw_rate[0])
         turn_1 = yaw_rate[0] + f_1 * (yaw_rate[1] - yaw_rate[0])
+        pushed = _pull(p, phi, gravity[0], gravity[1]) - yaw_acceleration
         drag = 0.0
-        drive = vane_acceleration(
-            p, phi, phi_rate, x_0, y_0, turn_0, yaw_acceleration, gravity[0], gravity[1],
-            density_ratio,
-        )  # fmt: skip
+        drive = _acceleration(p, phi_rate, h_0, y_0 * c - x_0 * s, phi_rate + turn_0, pushed, pace)
         if friction > 0.0:
             if phi_rate == 0.0:
                 if abs(drive) <= friction:
@@ -162,23 +220,40 @@ def advance_vane(
                 drag = -math.copysign(friction, drive)
             else:
                 drag = -math.copysign(friction, phi_rate)
+        along_h = x_h * c + y_h * s
+        across_h = y_h * c - x_h * s
         k_1 = drive + drag
         v_2 = phi_rate + 0.5 * step * k_1
-        k_2 = drag + vane_acceleration(
-            p, phi + 0.5 * step * phi_rate, v_2, x_h, y_h, turn_h, yaw_acceleration,
-            gravity[0], gravity[1], density_ratio,
-        )  # fmt: skip
+        d_2 = 0.5 * step * phi_rate
+        cosine, sine = _small_turn(d_2)
+        if p.imbalance != 0.0:
+            pushed = _pull(p, phi + d_2, gravity[0], gravity[1]) - yaw_acceleration
+        k_2 = drag + _acceleration(
+            p, v_2, h_h, across_h * cosine - along_h * sine, v_2 + turn_h, pushed, pace
+        )
         v_3 = phi_rate + 0.5 * step * k_2
-        k_3 = drag + vane_acceleration(
-            p, phi + 0.5 * step * v_2, v_3, x_h, y_h, turn_h, yaw_acceleration,
-            gravity[0], gravity[1], density_ratio,
-        )  # fmt: skip
+        d_3 = 0.5 * step * v_2
+        cosine, sine = _small_turn(d_3)
+        if p.imbalance != 0.0:
+            pushed = _pull(p, phi + d_3, gravity[0], gravity[1]) - yaw_acceleration
+        k_3 = drag + _acceleration(
+            p, v_3, h_h, across_h * cosine - along_h * sine, v_3 + turn_h, pushed, pace
+        )
         v_4 = phi_rate + step * k_3
-        k_4 = drag + vane_acceleration(
-            p, phi + step * v_3, v_4, x_1, y_1, turn_1, yaw_acceleration,
-            gravity[0], gravity[1], density_ratio,
-        )  # fmt: skip
-        phi += step / 6.0 * (phi_rate + 2.0 * v_2 + 2.0 * v_3 + v_4)
+        d_4 = step * v_3
+        cosine, sine = _small_turn(d_4)
+        if p.imbalance != 0.0:
+            pushed = _pull(p, phi + d_4, gravity[0], gravity[1]) - yaw_acceleration
+        along_1 = x_1 * c + y_1 * s
+        across_1 = y_1 * c - x_1 * s
+        k_4 = drag + _acceleration(
+            p, v_4, h_1, across_1 * cosine - along_1 * sine, v_4 + turn_1, pushed, pace
+        )
+        moved = step / 6.0 * (phi_rate + 2.0 * v_2 + 2.0 * v_3 + v_4)
+        phi += moved
+        if k + 1 < substeps:
+            cosine, sine = _small_turn(moved)
+            c, s = c * cosine - s * sine, s * cosine + c * sine
         rate_next = phi_rate + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
         if friction > 0.0 and rate_next * phi_rate < 0.0:
             rate_next = 0.0
