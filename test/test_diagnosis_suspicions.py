@@ -53,10 +53,13 @@ def test_an_unknown_beside_nothing_is_described_by_the_fault_that_explains_it() 
     assert suspicion_of(nothing, STATION) is None
 
 
-def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings() -> None:
+@pytest.mark.parametrize("to_one_side, width", [(0.0, 8.0), (12.0, 17.0)])
+def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings(
+    to_one_side: float, width: float
+) -> None:
     seen = recorded(STATION, 67).angles["vane"].angle
-    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen)))))
-    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": 8.0}
+    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen))))) + to_one_side
+    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": width}
     found = diagnose(recorded(with_keys(STATION, "vane", caught), 67), baseline())
     assert found.verdict == "unknown"
     assert "catches at one heading" in found.unexplained.description

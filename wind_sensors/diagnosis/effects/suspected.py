@@ -110,7 +110,9 @@ CATCH = Effect(
     update=_catch,
     smooths=True,
     templates=tuple(
-        {"catch_speed": 1.5, "heading": heading, "width": 8.0}
+        {"catch_speed": speed, "heading": heading, "width": width}
+        for speed in (1.5, 3.0)
+        for width in (8.0, 16.0)
         for heading in np.arange(-180.0, 180.0, 20.0).tolist()
     ),
     confusable={
