@@ -124,6 +124,7 @@ class Effect:
             whether the disc or a cup makes them.
         own_law: How it changes with the wind's speed differs from one cause to another: a stiff
             grease damps a vane less and less against the wind's own damping as the wind grows.
+        goes_with_direction: It is another one in wind from elsewhere, and has to show that.
         one_by_one: It hits one pulse here and one there, by chance, whatever became of those
             before: what comes in bursts is something else.
         loose_statistics: Statistics of the raw signals, by their labels, in which its form is not
@@ -165,6 +166,7 @@ class Effect:
     unmistakable: bool = False
     stirs: bool = False
     own_law: bool = False
+    goes_with_direction: bool = False
     one_by_one: bool = False
     loose_statistics: frozenset[str] = frozenset()
     standing: float = 0.1

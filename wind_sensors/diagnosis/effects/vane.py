@@ -269,6 +269,7 @@ VANE_ECCENTRICITY = Effect(
         "heading_deviation": "turning the mount under a steady wind",
         "vane_imbalance": "strong wind",
     },
+    goes_with_direction=True,
     needs=("a vane that turns by some 60 degrees",),
     size=_eccentricity_size,
 )

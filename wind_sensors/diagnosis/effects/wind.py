@@ -110,6 +110,7 @@ FLOW_DISTORTION = Effect(
     ),
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
     update=_distortion,
+    goes_with_direction=True,
     everywhere=True,
     templates=tuple(
         {**{other: 0.02 if other == name else 0.0 for other in _HARMONICS}, "deflection": 1.0}

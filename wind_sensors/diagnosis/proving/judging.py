@@ -45,6 +45,7 @@ from wind_sensors.diagnosis.proving.findings import (
     equal_explanations,
     findings_of,
 )
+from wind_sensors.diagnosis.proving.mere_shift import is_a_mere_shift
 from wind_sensors.diagnosis.proving.support import (
     UNSEEN_NOISY_GAIN,
     borne_out,
@@ -284,6 +285,9 @@ def _upheld(
         left, objection = "unknown", suspicion.words
     elif contradiction := _contradiction(naming, station):
         objection = contradiction
+    elif verdict == "named" and is_a_mere_shift(naming, station):
+        left = "unknown"
+        objection = "a constant would, too: the wind does not show that it goes with the direction"
     elif not determined(findings):
         objection = "of any size, nought among them"
     else:
