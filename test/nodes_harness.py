@@ -21,7 +21,8 @@ _WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 _DOMAINS = itertools.count(os.getppid() * _WORKERS + _WORKER, _WORKERS)
 """Test processes that run side by side share their parent and never meet in one domain."""
 
-_MOST_DOMAINS = 48
+_MOST_DOMAINS = 100
+"""Ports of higher domains may be those that Linux gives to anybody."""
 
 _BATCH = 20
 """Callbacks of one node before it is the next one's turn."""
@@ -66,15 +67,26 @@ class Graph:
         """Let a node do nothing more; what it has published still arrives."""
         self._resting.add(self._nodes.index(node))
 
-    def spin(self, until: Callable[[], bool], at_most: float = 20.0) -> None:
+    def spin(
+        self,
+        until: Callable[[], bool],
+        at_most: float = 20.0,
+        so_far: Callable[[], object] = lambda: "",
+    ) -> None:
         """Spin everything until the condition holds.
+
+        Args:
+            until: The condition.
+            at_most: Seconds to wait for it.
+            so_far: Tells how far it has come, if it never holds.
 
         Raises:
             AssertionError: It never did.
         """
         end = time.monotonic() + at_most
         while not until():
-            assert time.monotonic() < end, "what the test waits for never happened"
+            late = time.monotonic() >= end
+            assert not late, f"what the test waits for never happened {so_far()}"
             for index, executor in enumerate(self._executors):
                 if index in self._resting:
                     continue

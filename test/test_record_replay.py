@@ -110,8 +110,13 @@ def test_what_is_replayed_is_what_was_recorded(
     )  # fmt: skip
     expected = read_recording(original)
     wanted = len(expected.pulses["cup"].time) + len(expected.angles["vane"].time)
-    graph.spin(lambda: sum(recorder.counts.values()) == wanted, at_most=40.0)
+    graph.spin(
+        lambda: sum(recorder.counts.values()) >= wanted,
+        at_most=40.0,
+        so_far=lambda: f"{recorder.counts}, of {wanted}; replay: {replay.poll()}",
+    )
     output, _ = replay.communicate(timeout=20)
+    assert sum(recorder.counts.values()) == wanted
     assert replay.returncode == 0, output
     assert f"{wanted} messages" in output
     recorder.close()
