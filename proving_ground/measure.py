@@ -115,6 +115,8 @@ def _sonic(scene: Scene) -> tuple[Array, Array]:
     turned[:, 1] = sine * wind[:, 0] + cosine * wind[:, 1]
     turned = sonic.gain * turned + sonic.noise * scene.noise.standard_normal(turned.shape)
     turned = np.round(turned / SONIC_RESOLUTION) * SONIC_RESOLUTION
+    for change in scene.driver_changes:
+        turned = change(time, turned)
     keep = np.ones(time.size, dtype=bool)
     for _ in range(scene.noise.poisson(sonic.dropouts * scene.duration / 600.0)):
         begin = scene.noise.uniform(1.0, scene.duration)

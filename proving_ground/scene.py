@@ -34,7 +34,9 @@ class Scene:
     [m/s] apparent wind in the sensor's frame. motion is what the platform does, reported what its
     odometry says. angle_changes act on the nose heading on the grid, reading_changes on the
     sampled and wrapped reading, slot_changes on the disc's edge times, pulse_changes on what the
-    electronics make of those, stamp_changes by channel ("rotor", "vane", "odometry") on the stamps.
+    electronics make of those, reference_changes on the wind between the reference's heads,
+    driver_changes on the numbers that it sends, stamp_changes by channel ("rotor", "vane",
+    "odometry") on the stamps.
     """
 
     station: Station
@@ -58,6 +60,7 @@ class Scene:
     pulse_changes: list[TimesChange] = field(default_factory=list)
     odometry_changes: list[Callable[[Array, Motion], Motion]] = field(default_factory=list)
     reference_changes: list[Callable[[Array, Array], Array]] = field(default_factory=list)
+    driver_changes: list[Callable[[Array, Array], Array]] = field(default_factory=list)
     stamp_changes: dict[str, list[TimesChange]] = field(default_factory=dict)
 
     @property

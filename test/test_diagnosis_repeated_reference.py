@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from diagnosis_cases import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.comparing.counted_time import without_repeats
+from wind_sensors.diagnosis.comparing.counted_time import soft, without_repeats
 from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.station.signals import Recording
@@ -55,3 +56,24 @@ def test_a_healthy_station_with_such_a_reference_is_told_of_it_and_nothing_is_na
 def test_a_reference_that_hardly_ever_changes_is_refused() -> None:
     with pytest.raises(UserError, match="repeats the same wind"):
         prepare(holding(recorded(STATION, 61), 20.0, 18.0))
+
+
+def test_what_counts_in_part_is_as_noisy_as_the_whole_and_tells_as_much_less() -> None:
+    whole = prepare(recorded(STATION, 61), baseline().station, baseline().place)
+    counted = soft((np.floor(whole.grid.centres / 20.0) % 2 == 0).astype(np.float64))
+    half = whole.within(counted)
+    assert half.counted_share == pytest.approx(0.45, abs=0.05)
+    simulated = whole.simulate(whole.station)
+    noise, in_half = (
+        trust_of(seen, seen.simulate(seen.station), baseline()) for seen in (whole, half)
+    )
+    for channel in whole.channels:
+        ratio = in_half[channel.name].deviation / noise[channel.name].deviation
+        assert np.median(ratio) == pytest.approx(1.0, abs=0.1)
+    n = half.coefficients
+    for k in range(len(half.channels)):
+        white = half.vector(half.simulate(half.station), in_half)[k * n : (k + 1) * n]
+        assert np.mean(white**2) == pytest.approx(half.counted_share, rel=0.15)
+        assert np.mean(whole.vector(simulated, noise)[k * n : (k + 1) * n] ** 2) == pytest.approx(
+            1.0, rel=0.15
+        )

@@ -258,6 +258,16 @@ def test_every_cause_leaves_a_trace(stations: dict[str, Station], kind: str) -> 
     assert silent == []
 
 
+def test_a_driver_that_fills_gaps_repeats_the_numbers_to_the_last_digit(
+    stations: dict[str, Station],
+) -> None:
+    held = signals_of(stations["A"], 31, Planted("holding_reference", 3.0)).reference
+    repeats = np.all(np.diff(held, axis=0) == 0.0, axis=1)
+    assert repeats.mean() > 0.05
+    usual = signals_of(stations["A"], 31).reference
+    assert np.all(np.diff(usual, axis=0) == 0.0, axis=1).mean() < 0.01
+
+
 def test_an_effect_that_begins_late_leaves_the_beginning_alone(
     stations: dict[str, Station],
 ) -> None:

@@ -250,7 +250,7 @@ def sagging_supply(scene: Scene, amount: float, activity: Array) -> Parameters:
 
 
 def holding_reference(scene: Scene, amount: float, activity: Array) -> Parameters:
-    """A reference that repeats its last good wind while drops sit on its heads."""
+    """A reference whose driver repeats the last good numbers while drops sit on its heads."""
     every = float(scene.rng.uniform(8.0, 25.0))
     held = float(min(0.9 * amount, 0.7 * every))
     active = active_at(scene, activity)
@@ -260,7 +260,7 @@ def holding_reference(scene: Scene, amount: float, activity: Array) -> Parameter
         last = np.where(wet, 0, np.arange(time.size))
         return np.asarray(wind[np.maximum.accumulate(last)])
 
-    scene.reference_changes.append(hold)
+    scene.driver_changes.append(hold)
     return {"every_s": round(every, 2), "held_s": round(held, 2)}
 
 

@@ -19,6 +19,10 @@ LONGEST_GAP = 1.0
 BESIDE_GAP = 1.0
 """Nor so close to such a gap [s]."""
 
+FORGETTING = 3.0
+"""After it, a simulated instrument forgets the wind that was made up within so many times the time
+in which it answers: else it would seem to be slower than it is."""
+
 EDGE = 9
 """Weights rise and fall within so many bins."""
 
@@ -51,15 +55,22 @@ def without_repeats(recording: Recording) -> tuple[Recording, float]:
     return replace(recording, reference=silent), float(np.mean(repeated))
 
 
-def where_reference_is(recording: Recording, grid: Grid) -> FloatArray:
-    """Weights that are zero where the reference has a gap, shape (n,)."""
+def where_reference_is(recording: Recording, grid: Grid, answering: FloatArray) -> FloatArray:
+    """Weights that are zero where the reference has a gap, shape (n,).
+
+    Args:
+        recording: With a reference or without.
+        grid: Bins.
+        answering: Time in which the slowest instrument answers, at the bins [s], shape (n,).
+    """
     weight = np.ones(grid.n)
     reference = recording.reference
     if reference is None:
         return weight
     time = grid.seconds(reference.time[np.isfinite(reference.velocity).all(axis=1)])
     for k in np.flatnonzero(np.diff(time) > LONGEST_GAP):
-        begin, end = time[k] - BESIDE_GAP, time[k + 1] + BESIDE_GAP
+        forgetting = FORGETTING * float(np.interp(time[k + 1], grid.centres, answering))
+        begin, end = time[k] - BESIDE_GAP, time[k + 1] + max(BESIDE_GAP, forgetting)
         weight[(grid.centres > begin) & (grid.centres < end)] = 0.0
     return soft(weight)
 

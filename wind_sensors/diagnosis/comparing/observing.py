@@ -146,6 +146,11 @@ class View:
         """Number of cosine coefficients compared in each channel."""
         return min(self.grid.n, int(2.0 * self.grid.n * self.grid.dt * HIGHEST_FREQUENCY))
 
+    @property
+    def counted_share(self) -> float:
+        """Share of the record that counts: as much less is known than of a whole one."""
+        return 1.0 if self.mask is None else float(np.mean(self.mask**2))
+
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""
         return values if self.mask is None else values * self.mask

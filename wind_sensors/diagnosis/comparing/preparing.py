@@ -151,7 +151,8 @@ def prepare(
         expected=_expected(comparison, angles),
         measured=replace(empty, counted=empty.counted & turning),
     )
-    known_wind = where_reference_is(recording, grid)
+    answering = max(c.length for c in channels) / comparison.speed
+    known_wind = where_reference_is(recording, grid, answering)
     beside = _beside_expected(comparison)
     departure = {
         name: slow_departure(angle, comparison.speed, grid) for name, angle in beside.items()

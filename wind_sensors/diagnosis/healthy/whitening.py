@@ -30,6 +30,9 @@ LONGEST_EDGE = 15
 SMALLEST_DEVIATION = 0.02
 """Noise of a compared series is never taken below this [m/s], per coefficient."""
 
+LEAST_COUNTED = 0.05
+"""A record is never taken to count for less than this share of its time."""
+
 
 def trust_of(
     comparison: Comparison, simulated: Simulated, baseline: Baseline
@@ -79,11 +82,15 @@ def _trust(
     )
     mean_speed = float(np.mean(comparison.speed))
     by_chance = _chance(comparison, simulated, channel)
+    # Of a record that counts in part the coefficients are as many as ever, but not independent:
+    # their noise is that of a whole record, beside which they are smaller.
+    share = max(comparison.counted_share, LEAST_COUNTED)
+    usual = known.statistics_deviation_in(mean_speed) / np.sqrt(share)
     return Trust(
         slope=slope,
-        deviation=np.sqrt(variance + SMALLEST_DEVIATION**2),
+        deviation=np.sqrt(variance / share + SMALLEST_DEVIATION**2),
         statistics_mean=known.statistics_mean,
-        statistics_deviation=np.hypot(known.statistics_deviation_in(mean_speed), by_chance),
+        statistics_deviation=np.hypot(usual, by_chance),
         activity_deviation=known.activity_deviation(
             activity.sampling_variance(channel, mean_speed, comparison.grid)
         ),
@@ -150,6 +157,7 @@ class Whitener:
         """Minus twice the log-likelihood of a simulation, but for a constant."""
         vector = self.of(simulated)
         noise = sum(float(np.sum(np.log(t.deviation))) for t in self.trust.values())
+        noise *= self.comparison.counted_share
         return float(vector @ vector) + 2.0 * (noise - float(np.sum(np.log(self.shrinks))))
 
     def of_station(self, station: Station) -> FloatArray:

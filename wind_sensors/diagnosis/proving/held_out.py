@@ -126,16 +126,17 @@ def side_of(
         mask: Weights of the bins, shape (n,).
         blocks: Into how many the record is cut.
     """
-    share = float(np.mean(mask**2))
+    comparison = whitener.comparison.within(mask)
+    share = comparison.counted_share
+    of_blocks = float(np.mean(mask**2))
     trust: dict[str, Trust] = {}
     for channel in whitener.comparison.channels:
         t = whitener.trust[channel.name]
         trust[channel.name] = replace(
             t,
             deviation=t.deviation * np.sqrt(share),
-            statistics_deviation=t.statistics_deviation / np.sqrt(max(share, 0.1)),
+            statistics_deviation=t.statistics_deviation / np.sqrt(max(of_blocks, 0.1)),
         )
-    comparison = whitener.comparison.within(mask)
     return Side(unstanding(comparison, trust), comparison.simulate(station), blocks)
 
 
