@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from wind_sensors.errors import UserError
-from wind_sensors.instruments.dynamics.vane import integrate_vane
+from wind_sensors.instruments.dynamics.vane import integrate_vane, small_turn
 from wind_sensors.motion import rotations
 from wind_sensors.motion.platform_track import Motion
 from wind_sensors.simulation import Drive, ResponseState, respond
@@ -94,6 +94,12 @@ def test_a_cup_in_gusts_follows_its_equation():
     np.testing.assert_allclose(found.y, exact.y[0], atol=3e-5)
     np.testing.assert_allclose(found.psi, exact.y[1], atol=1e-4)
     np.testing.assert_allclose(found.rate, found.y / 0.2)
+
+
+@given(st.floats(-1.0, 1.0))
+@settings(max_examples=200, deadline=None)
+def test_a_small_turn_is_exact_whether_by_series_or_by_the_library(angle):
+    np.testing.assert_allclose(small_turn(angle), (np.cos(angle), np.sin(angle)), atol=3e-16)
 
 
 def test_a_vane_on_a_turning_unbalanced_mount_follows_its_equation():

@@ -121,11 +121,11 @@ def _pull(p: VaneParameters, phi: float, gravity_x: float, gravity_y: float) -> 
 
 
 _SMALL_TURN = 0.25
-"""Up to this angle [rad] the series of `_small_turn` hold to the last digit."""
+"""Up to this angle [rad] the series of `small_turn` hold to the last digit."""
 
 
 @inlined
-def _small_turn(angle: float) -> tuple[float, float]:
+def small_turn(angle: float) -> tuple[float, float]:
     """Cosine and sine of a small angle [rad].
 
     A library's functions take so long that each stage of a step would wait for them.
@@ -225,7 +225,7 @@ def advance_vane(
         k_1 = drive + drag
         v_2 = phi_rate + 0.5 * step * k_1
         d_2 = 0.5 * step * phi_rate
-        cosine, sine = _small_turn(d_2)
+        cosine, sine = small_turn(d_2)
         if p.imbalance != 0.0:
             pushed = _pull(p, phi + d_2, gravity[0], gravity[1]) - yaw_acceleration
         k_2 = drag + _acceleration(
@@ -233,7 +233,7 @@ def advance_vane(
         )
         v_3 = phi_rate + 0.5 * step * k_2
         d_3 = 0.5 * step * v_2
-        cosine, sine = _small_turn(d_3)
+        cosine, sine = small_turn(d_3)
         if p.imbalance != 0.0:
             pushed = _pull(p, phi + d_3, gravity[0], gravity[1]) - yaw_acceleration
         k_3 = drag + _acceleration(
@@ -241,7 +241,7 @@ def advance_vane(
         )
         v_4 = phi_rate + step * k_3
         d_4 = step * v_3
-        cosine, sine = _small_turn(d_4)
+        cosine, sine = small_turn(d_4)
         if p.imbalance != 0.0:
             pushed = _pull(p, phi + d_4, gravity[0], gravity[1]) - yaw_acceleration
         along_1 = x_1 * c + y_1 * s
@@ -252,7 +252,7 @@ def advance_vane(
         moved = step / 6.0 * (phi_rate + 2.0 * v_2 + 2.0 * v_3 + v_4)
         phi += moved
         if k + 1 < substeps:
-            cosine, sine = _small_turn(moved)
+            cosine, sine = small_turn(moved)
             c, s = c * cosine - s * sine, s * cosine + c * sine
         rate_next = phi_rate + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
         if friction > 0.0 and rate_next * phi_rate < 0.0:
