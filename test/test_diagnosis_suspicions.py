@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_INTERVAL
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.proving.suspicions import suspicion_beside, suspicion_of
-from wind_sensors.diagnosis.verdict import diagnose
+from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.station.signals import Angles, Recording
 
 
@@ -30,9 +31,23 @@ def _behind_play(recording: Recording, play_deg: float) -> Recording:
     return replace(recording, angles={"vane": Angles(vane.time, np.angle(np.exp(1j * shaft)))})
 
 
+@cache
+def _diagnosed_with_play(play_deg: float) -> Diagnosis:
+    return diagnose(_behind_play(recorded(STATION, 66), play_deg), baseline())
+
+
+@cache
+def _diagnosed_with_a_race_that_catches(to_one_side: float, width: float) -> Diagnosis:
+    """Catching so many degrees to one side of where the vane points most [deg]."""
+    seen = recorded(STATION, 67).angles["vane"].angle
+    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen))))) + to_one_side
+    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": width}
+    return diagnose(recorded(with_keys(STATION, "vane", caught), 67), baseline())
+
+
 @pytest.mark.parametrize("play_deg", [14.0, 28.0])
 def test_play_is_no_friction_though_both_hold_the_reading_still(play_deg: float) -> None:
-    found = diagnose(_behind_play(recorded(STATION, 66), play_deg), baseline())
+    found = _diagnosed_with_play(play_deg)
     assert found.verdict == "unknown"
     assert found.findings == ()
     assert "play between vane and sensor" in found.unexplained.description
@@ -43,7 +58,7 @@ def test_play_is_no_friction_though_both_hold_the_reading_still(play_deg: float)
 
 
 def test_an_unknown_beside_nothing_is_described_by_the_fault_that_explains_it() -> None:
-    naming = diagnose(_behind_play(recorded(STATION, 66), 14.0), baseline()).naming
+    naming = _diagnosed_with_play(14.0).naming
     nothing = replace(naming, fit=fit(naming.whitener, STATION, []))
     suspicion = suspicion_beside(nothing, STATION)
     assert suspicion is not None
@@ -57,22 +72,14 @@ def test_an_unknown_beside_nothing_is_described_by_the_fault_that_explains_it() 
 def test_a_bearing_that_catches_at_one_heading_is_no_friction_of_all_headings(
     to_one_side: float, width: float
 ) -> None:
-    seen = recorded(STATION, 67).angles["vane"].angle
-    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen))))) + to_one_side
-    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": width}
-    found = diagnose(recorded(with_keys(STATION, "vane", caught), 67), baseline())
+    found = _diagnosed_with_a_race_that_catches(to_one_side, width)
     assert found.verdict == "unknown"
     assert "catches at one heading" in found.unexplained.description
 
 
 def test_a_bearing_that_catches_all_the_time_is_no_friction_that_begins() -> None:
     # Where the wind turns late, the vane comes late to the heading at which it catches.
-    seen = recorded(STATION, 67).angles["vane"].angle
-    heading = float(np.degrees(np.angle(np.mean(np.exp(1j * seen)))))
-    caught = {"catch_speed": 4.0, "catch_heading_deg": heading, "catch_width_deg": 8.0}
-    naming = diagnose(
-        recorded(with_keys(STATION, "vane", caught), 67), baseline(), with_proof=False
-    ).naming
+    naming = _diagnosed_with_a_race_that_catches(0.0, 8.0).naming
     begun = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}, (200.0, None))
     fitted = fit(naming.whitener, STATION, [begun])
     suspicion = suspicion_of(replace(naming, fit=fitted), STATION)
@@ -82,7 +89,7 @@ def test_a_bearing_that_catches_all_the_time_is_no_friction_that_begins() -> Non
 
 
 def test_what_always_holds_is_spared_the_price_of_a_beginning_and_an_end() -> None:
-    naming = diagnose(_behind_play(recorded(STATION, 66), 14.0), baseline()).naming
+    naming = _diagnosed_with_play(14.0).naming
     friction = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
 
     def gain_over(interval: Interval) -> float:
