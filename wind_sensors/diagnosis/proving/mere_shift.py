@@ -61,15 +61,17 @@ def beyond_constants(naming: Naming, station: Station, term: Term) -> float:
     begin, end = window_of(comparison, term.interval)
     while_held = (comparison.grid.centres >= begin) & (comparison.grid.centres <= end)
     corrected = naming.fit.simulated.series
-    shifts = np.array(
-        [
-            _shift(naming, without, k, channel, while_held)
-            for k, channel in enumerate(comparison.channels)
-            if np.any(corrected[channel.name] != without.series[channel.name])
-        ]
-    )
-    white = null.through_standing(shifts)
     left = null.of(without)
+    n = comparison.coefficients
+    shifts = []
+    for k, channel in enumerate(comparison.channels):
+        if np.any(corrected[channel.name] != without.series[channel.name]):
+            shift = np.zeros(left.size)
+            shift[k * n : (k + 1) * n] = _shift(naming, without, channel, while_held)
+            shifts.append(shift)
+    if not shifts:
+        return np.inf
+    white = null.through_standing(np.array(shifts))
     sizes = np.linalg.lstsq(white.T, left, rcond=None)[0]
     by_constants = left - sizes @ white
     by_effect = null.of(naming.fit.simulated)
@@ -87,16 +89,13 @@ def _price(parameters: int) -> float:
 
 
 def _shift(
-    naming: Naming, without: Simulated, k: int, channel: Channel, while_held: npt.NDArray[np.bool_]
+    naming: Naming, without: Simulated, channel: Channel, while_held: npt.NDArray[np.bool_]
 ) -> FloatArray:
-    """Whitened change by a constant of one channel, shape (l,)."""
+    """Whitened change of one channel's coefficients by a constant, shape (coefficients,)."""
     null = naming.adequate
     comparison = null.comparison
-    n = comparison.coefficients
     of_vane = channel.kind == "vane_angle"
     series = comparison.speed if of_vane else without.series[channel.name]
     trust = null.trust[channel.name]
-    change = trust.slope * spectra.to_cosine(comparison.masked(series * while_held))[:n]
-    out = np.zeros(null.of(without).size)
-    out[k * n : (k + 1) * n] = change / trust.deviation
-    return out
+    change = spectra.to_cosine(comparison.masked(series * while_held))[: comparison.coefficients]
+    return np.asarray(trust.slope * change / trust.deviation)
