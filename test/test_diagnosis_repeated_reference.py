@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 from diagnosis_cases import STATION, baseline, recorded
 
-from wind_sensors.diagnosis.comparing.counted_time import soft, without_repeats
+from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.counted_time import (
+    soft,
+    where_reference_is,
+    without_repeats,
+)
 from wind_sensors.diagnosis.comparing.preparing import prepare
-from wind_sensors.diagnosis.healthy.whitening import trust_of
+from wind_sensors.diagnosis.effects.definition import with_keys
+from wind_sensors.diagnosis.healthy.whitening import trust_of, unstanding
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.station.signals import Recording
@@ -58,22 +64,44 @@ def test_a_reference_that_hardly_ever_changes_is_refused() -> None:
         prepare(holding(recorded(STATION, 61), 20.0, 18.0))
 
 
-def test_what_counts_in_part_is_as_noisy_as_the_whole_and_tells_as_much_less() -> None:
+def test_what_counts_in_part_is_as_noisy_as_the_whole() -> None:
     whole = prepare(recorded(STATION, 61), baseline().station, baseline().place)
     counted = soft((np.floor(whole.grid.centres / 20.0) % 2 == 0).astype(np.float64))
     half = whole.within(counted)
     assert half.counted_share == pytest.approx(0.45, abs=0.05)
-    simulated = whole.simulate(whole.station)
     noise, in_half = (
         trust_of(seen, seen.simulate(seen.station), baseline()) for seen in (whole, half)
     )
     for channel in whole.channels:
         ratio = in_half[channel.name].deviation / noise[channel.name].deviation
         assert np.median(ratio) == pytest.approx(1.0, abs=0.1)
-    n = half.coefficients
-    for k in range(len(half.channels)):
-        white = half.vector(half.simulate(half.station), in_half)[k * n : (k + 1) * n]
-        assert np.mean(white**2) == pytest.approx(half.counted_share, rel=0.15)
-        assert np.mean(whole.vector(simulated, noise)[k * n : (k + 1) * n] ** 2) == pytest.approx(
-            1.0, rel=0.15
-        )
+
+
+def test_half_a_record_speaks_half_as_loud_for_the_truth() -> None:
+    heavy = recorded(with_keys(STATION, "cup", {"inertia_factor": 3.0}), 61)
+    whole = prepare(replace(heavy, station=STATION), baseline().station, baseline().place)
+    counted = soft((np.floor(whole.grid.centres / 20.0) % 2 == 0).astype(np.float64))
+    half = whole.within(counted)
+    truth = with_keys(whole.station, "cup", {"inertia_factor": 3.0})
+
+    def said(seen: Comparison) -> float:
+        """What the truth brings, in the noise that it leaves."""
+        known = seen.simulate(truth)
+        whitener = unstanding(seen, trust_of(seen, known, baseline()))
+        costs = [np.sum(whitener.of(each) ** 2) for each in (seen.simulate(seen.station), known)]
+        return float(costs[0] - costs[1])
+
+    assert said(half) == pytest.approx(half.counted_share * said(whole), rel=0.25)
+
+
+@pytest.mark.parametrize("answering, wait", [(0.1, 1.0), (1.5, 4.5)])
+def test_after_a_gap_an_instrument_has_time_to_forget_the_wind_made_up(
+    answering: float, wait: float
+) -> None:
+    found, _ = without_repeats(holding(recorded(STATION, 61), 20.0, 4.0))
+    grid = prepare(recorded(STATION, 61)).grid
+    weights = where_reference_is(found, grid, np.full(grid.n, answering))
+    since_gap = grid.centres % 20.0 - 4.0
+    later = grid.centres > 20.0
+    assert np.all(weights[later & (since_gap > 0.0) & (since_gap < wait - 0.3)] == 0.0)
+    assert np.all(weights[later & (since_gap > wait + 3.0) & (since_gap < 12.0)] == 1.0)

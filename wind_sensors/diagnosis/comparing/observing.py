@@ -47,6 +47,9 @@ HIGHEST_OF_READINGS = 0.4
 
 BANDS = len(NORMALISED_BANDS) - 1
 
+LEAST_COUNTED = 0.01
+"""A record is never taken to count for less than this share of its time."""
+
 
 @dataclass(frozen=True)
 class Simulated:
@@ -148,8 +151,11 @@ class View:
 
     @property
     def counted_share(self) -> float:
-        """Share of the record that counts: as much less is known than of a whole one."""
-        return 1.0 if self.mask is None else float(np.mean(self.mask**2))
+        """Share of the record that counts, no less than `LEAST_COUNTED`.
+
+        As much less is known than of a whole one.
+        """
+        return 1.0 if self.mask is None else max(float(np.mean(self.mask**2)), LEAST_COUNTED)
 
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""

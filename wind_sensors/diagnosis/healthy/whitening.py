@@ -30,9 +30,6 @@ LONGEST_EDGE = 15
 SMALLEST_DEVIATION = 0.02
 """Noise of a compared series is never taken below this [m/s], per coefficient."""
 
-LEAST_COUNTED = 0.05
-"""A record is never taken to count for less than this share of its time."""
-
 
 def trust_of(
     comparison: Comparison, simulated: Simulated, baseline: Baseline
@@ -84,7 +81,7 @@ def _trust(
     by_chance = _chance(comparison, simulated, channel)
     # Of a record that counts in part the coefficients are as many as ever, but not independent:
     # their noise is that of a whole record, beside which they are smaller.
-    share = max(comparison.counted_share, LEAST_COUNTED)
+    share = comparison.counted_share
     usual = known.statistics_deviation_in(mean_speed) / np.sqrt(share)
     return Trust(
         slope=slope,
