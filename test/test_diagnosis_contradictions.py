@@ -23,7 +23,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.leading import held_throughout
 from wind_sensors.diagnosis.explaining.moves import looked_around
-from wind_sensors.diagnosis.explaining.rounds import best_beside
+from wind_sensors.diagnosis.explaining.rounds import Beside, best_beside
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.noise_level import Excess
@@ -108,7 +108,7 @@ def test_what_damps_a_vane_that_sticks_is_found_in_the_noise_that_it_leaves(
     searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
     stuck = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
     first = fit(searcher.whitener(searcher.bank.without), STATION, [stuck])
-    found = best_beside(searcher, first, [], frozenset())
+    found = best_beside(Beside(searcher, first, []), frozenset())
     if damping == 1.0:
         assert found is None
         return
@@ -269,7 +269,7 @@ def test_what_holds_throughout_is_not_said_to_pass(planted: Interval) -> None:
     passing = Term(catalogue()["vane_offset"], "vane", {"offset": 8.0}, (150.0, 300.0))
     one = fit(null, STATION, [passing], searcher.bank.without)
     null = searcher.whitener(one.simulated)
-    kept = held_throughout(searcher, Judged(one, null, evidence(one, null)), None)
+    kept = held_throughout(searcher, Judged(one, evidence(one, null), lambda: null), None)
     assert kept.fit.terms[0].interval == planted
     assert no_terms(null, searcher).cost > kept.fit.cost
 
@@ -283,7 +283,7 @@ def test_what_would_miss_the_eddies_of_the_whole_record_is_not_said_to_hold_thro
     )
     one = fit(null, STATION, [passing], searcher.bank.without)
     null = searcher.whitener(one.simulated)
-    candidate = Judged(one, null, evidence(one, null))
+    candidate = Judged(one, evidence(one, null), lambda: null)
     assert held_throughout(searcher, candidate, None).fit.terms[0].interval == ALWAYS
     monkeypatch.setattr(leading, "calms_too_much", lambda *_: True)
     assert held_throughout(searcher, candidate, None).fit.terms[0].interval == (150.0, None)

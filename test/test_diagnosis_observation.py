@@ -15,7 +15,10 @@ from scipy.signal import lfilter
 from wind_sensors.diagnosis.comparing.observation import Grid, rate_series
 from wind_sensors.diagnosis.comparing.observing import BANDS
 from wind_sensors.diagnosis.comparing.preparing import prepare
-from wind_sensors.diagnosis.comparing.raw_statistics.changes import change_statistics
+from wind_sensors.diagnosis.comparing.raw_statistics.changes import (
+    change_statistics,
+    windy_changes,
+)
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     step_statistics,
     stillness_statistics,
@@ -25,7 +28,7 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
-from wind_sensors.station.signals import Angles, Pulses, erratic
+from wind_sensors.station.signals import Angles, Pulses, erratic_readings
 
 SECOND = 1_000_000_000
 
@@ -107,7 +110,7 @@ def test_a_rotor_that_starts_late_stood_before() -> None:
 @given(st.floats(-2.0, 2.0), st.floats(0.0, 4.0))
 def test_a_vane_that_turns_is_not_erratic(start: float, rate: float) -> None:
     turning = start + rate * np.arange(400) / 20.0
-    assert not erratic(_readings(np.angle(np.exp(1j * turning)))).any()
+    assert not erratic_readings(_readings(np.angle(np.exp(1j * turning)))).any()
 
 
 def test_a_loose_wiper_is_erratic_and_nothing_else() -> None:
@@ -117,7 +120,7 @@ def test_a_loose_wiper_is_erratic_and_nothing_else() -> None:
     loose[400:440] = loose[900:930] = loose[1500] = True
     angle[loose] = rng.uniform(-np.pi, np.pi, loose.sum())
     angle[1500] = 2.5
-    found = erratic(_readings(angle))
+    found = erratic_readings(_readings(angle))
     assert np.mean(found[loose]) > 0.95
     near = np.convolve(loose, np.ones(9), "same") > 0
     assert not found[~near].any()
@@ -129,7 +132,7 @@ def test_no_chance_reading_survives_a_long_stay_in_a_gap() -> None:
     loose = np.zeros(3000, dtype=bool)
     loose[600:2400] = True
     angle[loose] = rng.uniform(-np.pi, np.pi, loose.sum())
-    assert erratic(_readings(angle))[loose].all()
+    assert erratic_readings(_readings(angle))[loose].all()
 
 
 def test_coarse_readings_are_told_from_those_of_a_vane_that_sticks() -> None:
@@ -150,7 +153,7 @@ def test_coarse_readings_are_told_from_those_of_a_vane_that_sticks() -> None:
 
 def test_sparse_readings_are_not_judged_by_their_steps() -> None:
     time = np.arange(100, dtype=np.int64) * SECOND
-    assert not erratic(Angles(time, np.where(np.arange(100) % 2, 3.0, 0.0))).any()
+    assert not erratic_readings(Angles(time, np.where(np.arange(100) % 2, 3.0, 0.0))).any()
 
 
 def test_slots_do_not_look_like_a_damaged_cup() -> None:
@@ -188,25 +191,27 @@ def test_a_limit_makes_the_largest_changes_smaller_than_damping_does() -> None:
     # Of Gaussian changes the 98 % quantile is 2.326 / 1.150 of the 75 % one, damped or not.
     gaussian = np.log(2.326 / 1.150)
     damped = lfilter([0.2], [1.0, -0.8], lively)
+    windy = windy_changes(speed)
     for series in (lively, damped):
-        assert change_statistics(series, speed)[0] == pytest.approx(gaussian, abs=0.05)
+        assert change_statistics(series, windy)[0] == pytest.approx(gaussian, abs=0.05)
     limited = np.cumsum(np.clip(np.diff(lively), -1.2, 1.2))
-    assert change_statistics(limited, speed[1:])[0] < gaussian - 0.5
+    assert change_statistics(limited, windy[1:])[0] < gaussian - 0.5
     # Slow wind, masked bins and the steps into them do not count.
     mask = np.ones(20_000)
     mask[5_000:5_500] = 0.0
     mended = np.where(mask > 0.5, lively, 1e3)
-    expected = change_statistics(lively, speed, mask)
-    np.testing.assert_array_equal(change_statistics(mended, speed, mask), expected)
+    counted = windy_changes(speed, mask)
+    expected = change_statistics(lively, counted)
+    np.testing.assert_array_equal(change_statistics(mended, counted), expected)
     slow = speed < np.quantile(speed, 1.0 / 3.0)
     wild = np.where(slow & np.roll(slow, -1), 1e3 * rng.standard_normal(20_000), lively)
-    assert change_statistics(wild, speed)[0] == pytest.approx(gaussian, abs=0.05)
+    assert change_statistics(wild, windy)[0] == pytest.approx(gaussian, abs=0.05)
 
 
 @pytest.mark.parametrize(("size", "still"), [(300, 1.0), (5_000, 0.0)])
 def test_too_little_change_says_nothing(size: int, still: float) -> None:
     series = still * np.random.default_rng(9).standard_normal(size)
-    assert change_statistics(series, np.full(size, 5.0)).tolist() == [0.0]
+    assert change_statistics(series, windy_changes(np.full(size, 5.0))).tolist() == [0.0]
 
 
 @pytest.mark.parametrize("form", represented([0.0, 1.0, 2.0], by=(1.0,)))

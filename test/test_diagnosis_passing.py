@@ -152,7 +152,7 @@ def test_where_another_effect_passes_one_that_the_screening_hardly_sees_is_tried
     )
 
     def starts(term: Term) -> list[list[Term]]:
-        return blind_starts(guessing, [Judged(replace(nothing, terms=(term,)), null, 0.0)])
+        return blind_starts(guessing, [Judged(replace(nothing, terms=(term,)), 0.0, lambda: null)])
 
     # Beside an effect of the vane the vane's, in its minutes; beside itself not again.
     assert [replace(gap, interval=(100.0, None))] in starts(eccentric)
@@ -261,7 +261,7 @@ def test_what_turns_the_whole_wind_is_tried_from_the_best_moment_on(searcher: Se
     lean = Term(catalogue()["axis_tilt"], "station", {"tilt_x": 20.0, "tilt_y": 0.0})
 
     def seen(term: Term, evidence: float) -> Judged:
-        return Judged(replace(nothing, terms=(term,)), null, evidence)
+        return Judged(replace(nothing, terms=(term,)), evidence, lambda: null)
 
     def tried(
         interval: Interval, ahead: float, *lasting: Judged

@@ -349,7 +349,7 @@ def test_of_explanations_as_good_the_one_of_what_stands_out_leads() -> None:
     def explained(effect: str, instrument: str, **values: float) -> Judged:
         term = Term(catalogue()[effect], instrument, values)
         fitted = fit(null, STATION, [term], searcher.bank.without, iterations=0)
-        return Judged(fitted, null, 0.0)
+        return Judged(fitted, 0.0, lambda: null)
 
     slow = explained("calibration_offset", "cup", offset=-0.1)
     turned = explained("vane_offset", "vane", offset=4.0)

@@ -11,7 +11,7 @@ from wind_sensors.estimation.constants import axes_of
 from wind_sensors.estimation.intake import Series
 from wind_sensors.estimation.timeline import Timeline
 from wind_sensors.station.model import Angle, Station
-from wind_sensors.station.signals import Angles, BoolArray, erratic
+from wind_sensors.station.signals import Angles, BoolArray, erratic_readings
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -73,7 +73,7 @@ def headings(
     since = (time - origin) * 1e-9
     if loose is None:
         floats = vane.gap_width_deg > 0.0 and vane.gap_reading_deg == "floating"
-        loose = erratic(Angles(time, reading), LOOSE_STEP) & floats
+        loose = erratic_readings(Angles(time, reading), LOOSE_STEP) & floats
     usable = np.isfinite(reading)
     for outage in vane.outages:
         usable &= (since < outage.start) | (since >= outage.stop)
@@ -157,7 +157,7 @@ class NoseReader:
         )
         kept = slice(max(known + part.time.size - _RECENT_READINGS, 0), None)
         self._recent = Angles(together.time[kept], together.angle[kept])
-        return erratic(together, LOOSE_STEP)[known:]
+        return erratic_readings(together, LOOSE_STEP)[known:]
 
     def _unfiltered(self, seen: Headings, constant: float) -> Headings:
         if constant <= 0.0:

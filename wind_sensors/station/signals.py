@@ -7,6 +7,7 @@ see the same numbers; differences become seconds as floats where they enter an e
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -48,8 +49,13 @@ class Angles:
     time: TimeArray
     angle: FloatArray
 
+    @cached_property
+    def erratic(self) -> BoolArray:
+        """Readings that jump by at least `ERRATIC_STEP`, see `erratic_readings`; shape (n,)."""
+        return erratic_readings(self)
 
-def erratic(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
+
+def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
     """Readings that jump about as an open potentiometer's do, and those close to them; shape (n,).
 
     A number drawn by chance may lie near the truth, so that readings within 0.15 s of a jump go

@@ -89,15 +89,14 @@ def levels(
         Shape (BANDS, segments).
     """
     coefficients = spectra.to_cosine(series)
-    frequency = spectra.cosine_frequencies(grid.n, grid.dt)
-    number = segments_of(grid)
-    size = np.bincount(number)
-    out = np.zeros((BANDS, size.size))
+    bands = np.zeros((BANDS, grid.n))
     for k, (low, high) in enumerate(band_frequencies(channel, mean_speed, grid)):
-        inside = (frequency >= low) & (frequency < high)
-        band = spectra.from_cosine(np.where(inside, coefficients, 0.0))
-        out[k] = np.log(np.bincount(number, band * band) / size + RESOLUTION**2)
-    return out
+        inside = spectra.coefficients_within(grid.n, grid.dt, float(low), float(high))
+        bands[k, inside] = coefficients[inside]
+    power = np.square(spectra.from_cosine(bands))
+    number = segments_of(grid)
+    sums = np.array([np.bincount(number, of_band) for of_band in power])
+    return np.asarray(np.log(sums / np.bincount(number) + RESOLUTION**2))
 
 
 def compressed(deviations: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from wind_sensors.compiled import compiled
 from wind_sensors.station.model import Angle, Cup, Propeller, Rotor, Station
-from wind_sensors.station.signals import Angles, Pulses, erratic
+from wind_sensors.station.signals import Angles, Pulses
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -198,7 +198,7 @@ def angle_series(
     Returns:
         Deviations within (-pi, pi], continued where a bin holds no reading.
     """
-    loose = erratic(angles)
+    loose = angles.erratic
     time = grid.seconds(angles.time)
     place = np.floor(time / grid.dt).astype(np.intp)
     usable = np.isfinite(angles.angle) & ~loose

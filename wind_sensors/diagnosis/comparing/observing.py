@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,10 @@ from wind_sensors.diagnosis.comparing.observation import (
     angle_series,
     rate_series,
 )
-from wind_sensors.diagnosis.comparing.raw_statistics.changes import change_statistics
+from wind_sensors.diagnosis.comparing.raw_statistics.changes import (
+    change_statistics,
+    windy_changes,
+)
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import interval_statistics
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     erratic_statistics,
@@ -32,7 +36,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
 )
 from wind_sensors.motion.frames import wrap
 from wind_sensors.station.model import Rotor, Station
-from wind_sensors.station.signals import Angles, Pulses, erratic
+from wind_sensors.station.signals import Angles, Pulses
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -157,6 +161,20 @@ class View:
         """
         return 1.0 if self.mask is None else max(float(np.mean(self.mask**2)), LEAST_COUNTED)
 
+    @cached_property
+    def mean_speed(self) -> float:
+        """Of the slow wind [m/s]."""
+        return float(np.mean(self.speed))
+
+    @cached_property
+    def counted_segments(self) -> npt.NDArray[np.bool_]:
+        """Segments all of whose bins count, shape (segments,)."""
+        return activity.counted_segments(self.grid, self.mask)
+
+    @cached_property
+    def _windy_changes(self) -> npt.NDArray[np.bool_]:
+        return windy_changes(self.speed, self.mask)
+
     def masked(self, values: FloatArray) -> FloatArray:
         """Values of the bins with those outside the mask set to zero."""
         return values if self.mask is None else values * self.mask
@@ -175,7 +193,7 @@ class View:
             expected_pulses: For the series alone, where chance took part in `pulses`: which of
                 them it hit says nothing, and would hide what moves the series by as little.
         """
-        seen = Simulated({}, {}, {}, {}, activity.counted_segments(self.grid, self.mask))
+        seen = Simulated({}, {}, {}, {}, self.counted_segments)
         for channel in self.channels:
             name = channel.instrument
             if channel.kind == "vane_angle":
@@ -213,7 +231,7 @@ class View:
             interval_statistics(
                 pulses, rotor, self.wind_from, self.speed, self.grid, self.mask
             ),
-            change_statistics(drawn, self.speed, self.mask),
+            change_statistics(drawn, self._windy_changes),
         )
         if on_average is None:
             return self._of_one(channel, series, cosine, statistics, drawn)
@@ -249,7 +267,7 @@ class View:
             stillness_statistics(angle, followed, self.speed, self.mask),
             erratic_statistics(readings, self.direction, self.grid, self.mask),
             step_statistics(readings, self.grid, self.mask),
-            change_statistics(angle, self.speed, self.mask),
+            change_statistics(angle, self._windy_changes),
         )
         series = deviation * self.speed
         cosine = spectra.to_cosine(self.masked(series))
@@ -270,13 +288,12 @@ class View:
         drawn: FloatArray,
     ) -> Simulated:
         """What is seen of one channel."""
-        mean_speed = float(np.mean(self.speed))
         return Simulated(
             {channel.name: cosine[: self.coefficients]},
             {channel.name: series},
             {channel.name: np.concatenate(statistics)},
-            {channel.name: activity.levels(drawn, channel, mean_speed, self.grid)},
-            activity.counted_segments(self.grid, self.mask),
+            {channel.name: activity.levels(drawn, channel, self.mean_speed, self.grid)},
+            self.counted_segments,
         )
 
     def _cosine(self, values: FloatArray) -> FloatArray:
@@ -305,7 +322,7 @@ class View:
         dt = float(np.median(np.diff(time)))
         around = np.interp(time, self.grid.centres, self.direction)
         deviation = wrap(readings.angle - around)
-        good = np.isfinite(deviation) & ~erratic(readings)
+        good = np.isfinite(deviation) & ~readings.erratic
         if not good.any():
             return np.full(BANDS, np.nan)
         if not good.all():
@@ -320,16 +337,15 @@ class View:
         self, coefficients: FloatArray, dt: float, channel: Channel, highest: float
     ) -> FloatArray:
         """Log mean square of the coefficients in the normalised bands."""
-        mean_speed = float(np.mean(self.speed))
-        frequency = spectra.cosine_frequencies(coefficients.size, dt)
-        edges = NORMALISED_BANDS * mean_speed / (2.0 * np.pi * channel.length)
+        edges = NORMALISED_BANDS * self.mean_speed / (2.0 * np.pi * channel.length)
         out = np.full(BANDS, np.nan)
-        power = coefficients * coefficients
         for k in range(BANDS):
             low, high = max(edges[k], LOWEST_BAND_FREQUENCY), min(edges[k + 1], highest)
-            inside = (frequency >= low) & (frequency < high)
-            if high > 1.1 * low and np.count_nonzero(inside) >= 20:
-                out[k] = np.log(np.mean(power[inside]) + 1e-12)
+            inside = coefficients[
+                spectra.coefficients_within(coefficients.size, dt, float(low), float(high))
+            ]
+            if high > 1.1 * low and inside.size >= 20:
+                out[k] = np.log(np.mean(inside * inside) + 1e-12)
         return out
 
 

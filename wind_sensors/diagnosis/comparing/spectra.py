@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -80,6 +81,13 @@ def from_cosine(coefficients: FloatArray) -> FloatArray:
 def cosine_frequencies(n: int, dt: float) -> FloatArray:
     """Frequencies of the n coefficients [Hz]."""
     return np.arange(n) / (2.0 * n * dt)
+
+
+@lru_cache(maxsize=64)
+def coefficients_within(n: int, dt: float, low: float, high: float) -> slice:
+    """Which of n coefficients have frequencies from `low` up to, but not at, `high` [Hz]."""
+    first, last = np.searchsorted(cosine_frequencies(n, dt), (low, high))
+    return slice(int(first), max(int(first), int(last)))
 
 
 def band_edges(n: int) -> npt.NDArray[np.intp]:

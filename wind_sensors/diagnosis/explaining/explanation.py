@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit, parameters_of
 from wind_sensors.diagnosis.explaining.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_PARAMETER,
@@ -135,13 +137,18 @@ class Judged:
 
     Attributes:
         fit: The fit.
-        whitener: Its null.
         evidence: Minus twice the penalised log-likelihood.
+        null: Makes the null; few are asked for.
     """
 
     fit: Fit
-    whitener: Whitener
     evidence: float
+    null: Callable[[], Whitener]
+
+    @cached_property
+    def whitener(self) -> Whitener:
+        """The null."""
+        return self.null()
 
 
 def judged(
@@ -171,10 +178,17 @@ def judged(
         again = seen_in(whitener, again)
         return again, evidence(again, whitener)
 
-    fits = in_parallel(one, list(explanations), searcher.workers)
+    how = (roughly, iterations)
+    new = [e for e in explanations if searcher.judgements.find((e, named), how) is None]
+    found = in_parallel(
+        one, new, searcher.workers, work=lambda candidate: len(parameters_of(candidate.terms))
+    )
+    for candidate, judgement in zip(new, found, strict=True):
+        searcher.judgements.keep((candidate, named), judgement, how)
+    known = [searcher.judgements.find((e, named), how) for e in explanations]
     return [
-        Judged(again, searcher.whitener(again.simulated, named), value)
-        for again, value in sorted(fits, key=lambda pair: pair[1])
+        Judged(again, value, partial(searcher.whitener, again.simulated, named))
+        for again, value in sorted((k for k in known if k is not None), key=itemgetter(1))
     ]
 
 

@@ -78,7 +78,7 @@ class Fit:
 
 def without_term(known: Fit, left_out: int) -> Fit:
     """A fit's other terms where they are, with their derivatives; not fitted again."""
-    owners = [k for k, _ in _parameters(known.terms)]
+    owners = [k for k, _ in parameters_of(known.terms)]
     kept = [place for place, owner in enumerate(owners) if owner != left_out]
     return replace(
         known,
@@ -87,7 +87,8 @@ def without_term(known: Fit, left_out: int) -> Fit:
     )
 
 
-def _parameters(terms: Sequence[Term]) -> list[tuple[int, Parameter]]:
+def parameters_of(terms: Sequence[Term]) -> list[tuple[int, Parameter]]:
+    """All parameters of all terms, each with the number of its term."""
     return [(k, p) for k, term in enumerate(terms) for p in term.effect.parameters]
 
 
@@ -176,7 +177,7 @@ class Problem:
         """
         columns = [] if carried is None else list(carried.T)
         first = len(columns)
-        for k, (owner, parameter) in list(enumerate(_parameters(self._terms)))[first:]:
+        for k, (owner, parameter) in list(enumerate(parameters_of(self._terms)))[first:]:
             step = parameter.difference if steps is None else float(steps[k])
             if not low[k] <= values[k] + step <= high[k]:
                 step = -step
@@ -272,7 +273,7 @@ def fit(
         The fit; without terms, what there is without any effect.
     """
     problem = Problem(whitener, station, terms, rest)
-    parameters = [p for _, p in _parameters(terms)]
+    parameters = [p for _, p in parameters_of(terms)]
     low, high = _bounds(whitener, terms)
     scale = np.array([p.difference for p in parameters])
     values = np.clip(values_of(terms), low, high)
@@ -393,7 +394,7 @@ def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> Flo
         explanation: The fit.
     """
     problem = Problem(whitener, station, explanation.terms, explanation.simulated)
-    parameters = [p for _, p in _parameters(explanation.terms)]
+    parameters = [p for _, p in parameters_of(explanation.terms)]
     low, high = _bounds(whitener, explanation.terms)
     values = np.clip(values_of(explanation.terms), low, high)
     steps = []
@@ -411,7 +412,7 @@ def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> Flo
 
 def _bounds(whitener: Whitener, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
     """Bounds of all parameters; those that are told or not to be fitted have no room."""
-    placed = _parameters(terms)
+    placed = parameters_of(terms)
     low = np.array([p.low for _, p in placed])
     high = np.array([p.high for _, p in placed])
     drive = whitener.comparison.drive

@@ -303,7 +303,7 @@ def swapped(
         excluded: Names of effects that are not to be used.
     """
     losers: list[Judged] = []
-    leader = Judged(current, whitener, evidence(current, whitener))
+    leader = Judged(current, evidence(current, whitener), lambda: whitener)
     waiting = [term.key for term in current.terms]
     most = 2 * len(waiting)
     for key in waiting:  # grows while terms take the places of others
@@ -364,7 +364,7 @@ def _brings_enough(searcher: Searcher, fewer: Fit, more: Fit) -> bool:
     """
     form = searcher.whitener(fewer.simulated, fewer)
     before, after = seen_in(form, fewer), seen_in(form, more)
-    candidate = Judged(after, form, evidence(after, form))
+    candidate = Judged(after, evidence(after, form), lambda: form)
     gain = brought(searcher, candidate, before, evidence(before, form))
     return gain >= inexactness(searcher, form, before, after)
 

@@ -33,6 +33,7 @@ from wind_sensors.diagnosis.explaining.onsets import with_interval
 from wind_sensors.diagnosis.explaining.pairs import better_pair
 from wind_sensors.diagnosis.explaining.rounds import (
     CONTENDERS,
+    Beside,
     FirstRound,
     best_beside,
     best_single,
@@ -67,7 +68,8 @@ def name(
         progress: Called with the share done.
     """
     whitener, singles = first.whitener, first.singles
-    found = _greedy(searcher, progress, first, frozenset())
+    beside: list[Beside] = []
+    found = _greedy(searcher, progress, first, frozenset(), beside)
     if found.fit.terms and not any(term.is_told for term in found.fit.terms):
         pair = better_pair(searcher, whitener, singles, found.fit)
         if pair is not None:
@@ -83,7 +85,7 @@ def name(
         return found
     everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
     led = best_single(searcher, whitener, singles, everywhere)
-    narrow = _greedy(searcher, progress, replace(first, led=led), everywhere)
+    narrow = _greedy(searcher, progress, replace(first, led=led), everywhere, beside)
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
     simpler = (
@@ -134,6 +136,7 @@ def _greedy(
     progress: Callable[[float], None] | None,
     first: FirstRound,
     excluded: frozenset[str],
+    beside: list[Beside],
 ) -> Naming:
     """Take the effect that leads, judge the noise again, and look for one beside it.
 
@@ -142,6 +145,7 @@ def _greedy(
         progress: Called with the share done.
         first: Single effects and the one that leads.
         excluded: Names of effects that are not to be used.
+        beside: What was tried beside an effect already; grows.
     """
     report = progress or (lambda share: None)
     nothing = no_terms(first.whitener, searcher)
@@ -154,41 +158,45 @@ def _greedy(
         report(1.0)
         return _settled(searcher, nothing, (), screened)
     leader, losers = first.led
-    singles = first.singles
-    current, alternatives = _with_another(searcher, leader.fit, losers, singles, excluded)
+
+    def with_another(
+        known: Fit, behind: tuple[Alternative, ...], without: frozenset[str]
+    ) -> tuple[Fit, tuple[Alternative, ...]]:
+        for tried in beside:
+            if tried.first.terms == known.terms:
+                return _with_another(tried, behind, without)
+        beside.append(Beside(searcher, known, first.singles))
+        return _with_another(beside[-1], behind, without)
+
+    current, alternatives = with_another(leader.fit, losers, excluded)
     report(0.8)
     if len(current.terms) == 1 and current.terms[0].key != leader.fit.terms[0].key:
         # What took the place of two may stand beside another one itself.
-        current, alternatives = _with_another(searcher, current, alternatives, singles, excluded)
+        current, alternatives = with_another(current, alternatives, excluded)
     report(1.0)
     alone = Alone(leader.fit.terms, losers)
     found = _settled(searcher, current, alternatives, screened)
     gone = {t.effect.name for t in current.terms} - {t.effect.name for t in found.fit.terms}
     if found.fit.terms and gone:
         # Beside what is left there may be something else in the place of what cannot be.
-        again = _with_another(searcher, found.fit, (), singles, excluded | gone)
+        again = with_another(found.fit, (), excluded | gone)
         if len(again[0].terms) > 1:
             found = _settled(searcher, *again, screened)
     return replace(found, alone=alone)
 
 
 def _with_another(
-    searcher: Searcher,
-    first: Fit,
-    losers: tuple[Alternative, ...],
-    singles: Sequence[Fit],
-    excluded: frozenset[str],
+    beside: Beside, losers: tuple[Alternative, ...], excluded: frozenset[str]
 ) -> tuple[Fit, tuple[Alternative, ...]]:
     """An effect with the best one beside it, if the two hold together, and what comes close.
 
     Args:
-        searcher: The search.
-        first: The effect.
+        beside: The effect, and what is tried beside it.
         losers: Single effects that lost against it.
-        singles: Fits of single effects.
         excluded: Names of effects that are not to be used.
     """
-    second = best_beside(searcher, first, singles, excluded)
+    searcher, first = beside.searcher, beside.first
+    second = best_beside(beside, excluded)
     current = first if second is None else second[0].fit
     whitener = searcher.whitener(current.simulated)
     current = fit(whitener, searcher.station, current.terms, searcher.bank.without)

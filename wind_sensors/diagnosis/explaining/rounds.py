@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -108,16 +109,18 @@ def best_single(
 
 
 def best_beside(
-    searcher: Searcher, first: Fit, singles: Sequence[Fit], excluded: frozenset[str]
+    beside: Beside, excluded: frozenset[str]
 ) -> tuple[Judged, tuple[Alternative, ...]] | None:
     """The best effect beside those so far; None: none brings enough.
 
     What is left is judged as what the named effects, in another form, do not explain.
+
+    Args:
+        beside: What is tried.
+        excluded: Names of effects that are not to be used.
     """
-    whitener = searcher.whitener(first.simulated, first)
-    current = seen_in(whitener, first)
-    fits = _further_fits(searcher, whitener, current, singles, excluded)
-    return _one_more(searcher, whitener, current, fits, first)
+    fits = beside.fits(excluded)
+    return _one_more(beside.searcher, beside.whitener, beside.current, fits, beside.first)
 
 
 def _one_more(
@@ -154,59 +157,100 @@ def _one_more(
     return leader, losers
 
 
-def _further_fits(
-    searcher: Searcher,
-    whitener: Whitener,
-    current: Fit,
-    singles: Sequence[Fit],
-    excluded: frozenset[str],
-) -> list[Fit]:
-    """Fits of the terms so far with one more each.
+@dataclass
+class Beside:
+    """What is tried beside the terms so far, each once however often it is asked for.
 
-    Args:
+    Attributes:
         searcher: The search.
-        whitener: The null of the terms so far.
-        current: The terms so far.
+        first: The terms so far.
         singles: Fits of single effects: of the best the size that they have alone is tried, too,
             where a small one shows no way.
-        excluded: Names of effects that are not to be used.
     """
-    used = {t.key for t in current.terms}
 
-    def eligible(starts: Sequence[Term]) -> bool:
-        return may_join(starts[0], current.terms) and starts[0].effect.name not in excluded
+    searcher: Searcher
+    first: Fit
+    singles: Sequence[Fit]
+    _fitted: list[tuple[Sequence[Term], Fit]] = field(default_factory=list, repr=False)
 
-    windowed = [
-        starts
-        for starts in window_starts(searcher, whitener, current.vector, used)
-        if eligible(starts)
-    ]
-    apart = _promising_apart(searcher, current, singles)
-    hidden = [term for term in _hidden_beside(searcher, whitener, current) if eligible([term])]
-    if not windowed and not apart and not hidden:
-        scores = searcher.scores(whitener, current.vector)
-        if all(
-            s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
-        ):
-            return []
-    candidates = [
-        starts
-        for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
-        if eligible(starts) and not is_a_stall(searcher, current, starts[0])
-    ]
-    known = {starts[0].key: starts for starts in candidates}
-    alone = [f for f in singles if f.terms[0].interval == ALWAYS and eligible(f.terms)]
-    large = [*sorted(alone, key=total)[:LARGE_CANDIDATES], *apart]
-    for term in (*(single.terms[0] for single in large), *hidden):
-        if not eligible([term]):
-            continue
-        if term.key not in known:
-            known[term.key] = []
-            candidates.append(known[term.key])
-        known[term.key] += [
-            replace(term, values=values) for values in term.effect.either_sign(term.values)
+    @cached_property
+    def whitener(self) -> Whitener:
+        """The null of the terms so far, in whatever form they have."""
+        return self.searcher.whitener(self.first.simulated, self.first)
+
+    @cached_property
+    def current(self) -> Fit:
+        """The terms so far in that null."""
+        return seen_in(self.whitener, self.first)
+
+    @cached_property
+    def _windowed(self) -> list[list[Term]]:
+        used = {t.key for t in self.current.terms}
+        return window_starts(self.searcher, self.whitener, self.current.vector, used)
+
+    @cached_property
+    def _apart(self) -> list[Fit]:
+        return _promising_apart(self.searcher, self.current, self.singles)
+
+    @cached_property
+    def _hidden(self) -> list[Term]:
+        return _hidden_beside(self.searcher, self.whitener, self.current)
+
+    def fits(self, excluded: frozenset[str]) -> list[Fit]:
+        """Fits of the terms so far with one more each.
+
+        Args:
+            excluded: Names of effects that are not to be used.
+        """
+        candidates = self._candidates(excluded)
+        tried = [starts for starts, _ in self._fitted]
+        new = [starts for starts in candidates if starts not in tried]
+        fits = self.searcher.fit_each(self.whitener, self.current, new)
+        self._fitted += zip(new, fits, strict=True)
+        chosen = [
+            next(fit for starts, fit in self._fitted if starts == wanted)
+            for wanted in candidates
         ]
-    return searcher.fit_all(whitener, current, [*candidates, *windowed])
+        return self.searcher.possible(chosen)
+
+    def _candidates(self, excluded: frozenset[str]) -> list[list[Term]]:
+        """Starting points of what may be worth a fit, several for each effect."""
+        searcher, whitener, current = self.searcher, self.whitener, self.current
+
+        def eligible(starts: Sequence[Term]) -> bool:
+            return may_join(starts[0], current.terms) and starts[0].effect.name not in excluded
+
+        windowed = [starts for starts in self._windowed if eligible(starts)]
+        hidden = [term for term in self._hidden if eligible([term])]
+        if not windowed and not self._apart and not hidden:
+            used = {t.key for t in current.terms}
+            scores = searcher.scores(whitener, current.vector)
+            if all(
+                s.gain < WORTH_ANOTHER_TURN
+                for s in scores
+                if (s.effect, s.instrument) not in used
+            ):
+                return []
+        candidates = [
+            starts
+            for starts in searcher.single_candidates(
+                whitener, current.vector, LATER_CANDIDATES
+            )
+            if eligible(starts) and not is_a_stall(searcher, current, starts[0])
+        ]
+        known = {starts[0].key: starts for starts in candidates}
+        alone = [f for f in self.singles if f.terms[0].interval == ALWAYS and eligible(f.terms)]
+        large = [*sorted(alone, key=total)[:LARGE_CANDIDATES], *self._apart]
+        for term in (*(single.terms[0] for single in large), *hidden):
+            if not eligible([term]):
+                continue
+            if term.key not in known:
+                known[term.key] = []
+                candidates.append(known[term.key])
+            known[term.key] += [
+                replace(term, values=values) for values in term.effect.either_sign(term.values)
+            ]
+        return [*candidates, *windowed]
 
 
 def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -> list[Fit]:
@@ -221,12 +265,17 @@ def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -
     """
     null = searcher.whitener(searcher.bank.without)
     so_far = evidence(no_terms(null, searcher), null)
-    own = [
-        (in_own_noise(searcher, f, None), f)
+    apart = [
+        f
         for f in singles
         if f.terms[0].interval == ALWAYS and searcher.is_apart(current, f.terms[0])
     ]
-    promising = [(cost, f) for cost, f in own if so_far - cost > WORTH_ANOTHER_TURN]
+    own = in_parallel(lambda f: in_own_noise(searcher, f), apart, searcher.workers)
+    promising = [
+        (cost, f)
+        for cost, f in zip(own, apart, strict=True)
+        if so_far - cost > WORTH_ANOTHER_TURN
+    ]
     return [f for _, f in sorted(promising, key=lambda pair: pair[0])[:LARGE_CANDIDATES]]
 
 
@@ -314,7 +363,7 @@ def _finalists(
         named: The terms so far; None: there are none.
     """
     found: dict[int, Fit] = {k: f for k, f in enumerate(fits) if f.terms[-1].is_told}
-    own = [in_own_noise(searcher, f, named) for f in fits]
+    own = in_parallel(lambda f: in_own_noise(searcher, f, named), fits, searcher.workers)
     worth = False
     for costs, so_far in (
         ([total(f) for f in fits], total(current)),

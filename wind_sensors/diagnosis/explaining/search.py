@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 
@@ -15,8 +15,9 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.bounds import without_idle, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit, parameters_of
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
+from wind_sensors.diagnosis.explaining.recent import Recent
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
     JOINT_TEMPLATES,
@@ -79,6 +80,11 @@ PENALTY_PER_FURTHER_PARAMETER = 4.0
 PENALTY_PER_INTERVAL = 10.0
 """Cost of a beginning or an end inside the record."""
 
+WHITENERS = 4
+JUDGEMENTS = 32
+"""So many of the nulls and of the judgements asked for last are kept: each null takes about 10 MB,
+each judgement one."""
+
 
 def interval_cost(term: Term) -> float:
     """What a term's beginning and end cost; nought where the signals tell them."""
@@ -100,6 +106,7 @@ class Searcher:
         misplaced: What the error of the reference's place changes, one standard deviation a row.
         effects: The catalogue.
         workers: Processes.
+        judgements: Fits made again in the nulls that they leave, and their evidence.
     """
 
     comparison: Comparison
@@ -110,6 +117,12 @@ class Searcher:
     effects: Mapping[str, Effect]
     guesses: Mapping[tuple[str, str], Sequence[Term]]
     workers: int = 1
+    _whiteners: Recent[Whitener] = field(
+        default_factory=lambda: Recent(WHITENERS), init=False, repr=False
+    )
+    judgements: Recent[tuple[Fit, float]] = field(
+        default_factory=lambda: Recent(JUDGEMENTS), init=False, repr=False
+    )
 
     @property
     def station(self) -> Station:
@@ -130,8 +143,11 @@ class Searcher:
             named: Effects that are taken for granted, in a form that need not be exact; None:
                 there are none.
         """
-        trust = trust_of(self.comparison, simulated, self.baseline)
-        return self._whitener(trust, named)
+
+        def anew() -> Whitener:
+            return self._whitener(trust_of(self.comparison, simulated, self.baseline), named)
+
+        return self._whiteners.of((simulated, named), anew)
 
     def _whitener(self, trust: Mapping[str, Trust], named: Fit | None) -> Whitener:
         templates = self.bank.templates
@@ -345,6 +361,12 @@ class Searcher:
 
         Without those that the raw signals rule out.
         """
+        return self.possible(self.fit_each(whitener, current, candidates))
+
+    def fit_each(
+        self, whitener: Whitener, current: Fit | None, candidates: Sequence[Sequence[Term]]
+    ) -> list[Fit]:
+        """The same, with those, in the order of the candidates."""
         rest = self.bank.without
 
         def one(starts: Sequence[Term]) -> Fit:
@@ -354,7 +376,8 @@ class Searcher:
             # Starts are tried once each; a fit takes its derivatives anew a few times.
             return len(starts) + TIMES_DERIVED * len(starts[0].effect.parameters)
 
-        return self._possible(in_parallel(one, list(candidates), self.workers, work=work))
+        fits: list[Fit] = in_parallel(one, list(candidates), self.workers, work=work)
+        return fits
 
     def refit_all(self, whitener: Whitener, explanations: Sequence[Sequence[Term]]) -> list[Fit]:
         """Fits of whole explanations from where they are.
@@ -366,10 +389,12 @@ class Searcher:
             lambda terms: fit(whitener, self.station, terms, rest, least=ROUGHLY),
             list(explanations),
             self.workers,
+            work=lambda terms: len(parameters_of(terms)),
         )
-        return self._possible(fits)
+        return self.possible(fits)
 
-    def _possible(self, fits: Sequence[Fit]) -> list[Fit]:
+    def possible(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Those fits that the raw signals do not rule out."""
         return [f for f in fits if not ruled_out(self.comparison, self.station, f.terms)]
 
 

@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.explaining.intervals import interval_of
 from wind_sensors.diagnosis.explaining.terms import Term, suggested
 from wind_sensors.station.model import Angle
-from wind_sensors.station.signals import BoolArray, erratic
+from wind_sensors.station.signals import BoolArray
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def _coarse_for_a_while(comparison: Comparison, vane: str) -> list[Term]:
     if np.count_nonzero(repeated) < FEWEST_STEPS:
         return []
     # A wiper that floats in a gap interrupts no steps.
-    steady = ~erratic(readings)[told]
+    steady = ~readings.erratic[told]
     degrees, time, coarse = degrees[steady], time[steady], repeated[place][steady]
     begin, end = _longest_run(coarse)
     inside = np.unique(degrees[begin:end][coarse[begin:end]])
@@ -233,7 +233,7 @@ def _gap(
 
 def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     """A gap where readings jump about, in the sector in which they do."""
-    wrong = erratic(comparison.recording.angles[channel.instrument])
+    wrong = comparison.recording.angles[channel.instrument].erratic
     if not wrong.any() or np.mean(wrong) < LEAST_ERRATIC:
         return []
     vane = channel.instrument

@@ -18,9 +18,22 @@ LEAST_USUAL = 0.2
 and would drown all else here."""
 
 
-def change_statistics(
-    series: FloatArray, speed: FloatArray, mask: FloatArray | None = None
-) -> FloatArray:
+def windy_changes(
+    speed: FloatArray, mask: FloatArray | None = None
+) -> npt.NDArray[np.bool_]:
+    """Which changes from bin to bin count, shape (n - 1,).
+
+    Args:
+        speed: Slow wind speed at the bins [m/s], shape (n,); its slowest third does not count.
+        mask: Weight of the bins; those below a half do not count.
+    """
+    counted = speed[1:] >= np.quantile(speed, 1.0 / 3.0)
+    if mask is not None:
+        counted &= (mask[1:] > 0.5) & (mask[:-1] > 0.5)
+    return np.asarray(counted)
+
+
+def change_statistics(series: FloatArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
     """How large the largest changes from bin to bin are against the usual ones.
 
     Damping and inertia make all changes smaller, in proportion. A limit, a play or a catch does
@@ -28,15 +41,11 @@ def change_statistics(
 
     Args:
         series: Value in each bin, shape (n,).
-        speed: Slow wind speed at the bins [m/s], shape (n,); its slowest third does not count.
-        mask: Weight of the bins; those below a half do not count.
+        counted: Which changes count, see `windy_changes`, shape (n - 1,).
 
     Returns:
         Logarithm of the 98 % quantile over the 75 % one; 0 where too little changes.
     """
-    counted = speed[1:] >= np.quantile(speed, 1.0 / 3.0)
-    if mask is not None:
-        counted &= (mask[1:] > 0.5) & (mask[:-1] > 0.5)
     changes = np.abs(np.diff(series))[counted]
     if changes.size < FEWEST_CHANGES:
         return np.zeros(CHANGES)

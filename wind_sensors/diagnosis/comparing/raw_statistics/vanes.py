@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observation import Grid
-from wind_sensors.station.signals import Angles, erratic
+from wind_sensors.station.signals import Angles
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def erratic_statistics(
     inside = (place >= 0) & (place < grid.n)
     if mask is not None:
         inside[inside] = mask[place[inside]] > 0.5
-    wrong = erratic(angles)[inside].astype(np.float64)
+    wrong = angles.erratic[inside].astype(np.float64)
     if wrong.size == 0 or not wrong.any():
         return np.zeros(ERRATIC)
     heading = around[place[inside]]
@@ -150,6 +150,6 @@ def chance_of_stillness(steps: float, other_steps: float) -> FloatArray:
 def _smallness(turns: FloatArray, usual: FloatArray, shares: tuple[float, ...]) -> FloatArray:
     """Logarithms of quantiles over the 90 % one; neither is less than a part of the usual one."""
     large = float(np.quantile(usual, 0.9)) + 1e-9
-    reach = max(float(np.quantile(turns, 0.9)), LEAST_REACH * large)
-    small = np.quantile(turns, shares) + STANDSTILL * large
-    return np.asarray(np.log(small / reach), dtype=np.float64)
+    reach, *small = np.quantile(turns, (0.9, *shares))
+    reach = max(float(reach), LEAST_REACH * large)
+    return np.asarray(np.log((np.array(small) + STANDSTILL * large) / reach), dtype=np.float64)
