@@ -20,6 +20,8 @@ from wind_sensors.diagnosis.comparing.raw_statistics.changes import (
     windy_changes,
 )
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
+    chance_of_steps,
+    standing_share,
     step_statistics,
     stillness_statistics,
 )
@@ -168,6 +170,48 @@ def test_slots_do_not_look_like_a_damaged_cup() -> None:
     assert slots[0] > 0.02 and slots[1] > 0.02
     assert slots[2] < 0.1 * slots[1]
     assert damage[0] < 0.1 * damage[2]
+
+
+@pytest.mark.parametrize("stands", [60, 400])
+def test_a_vane_that_rests_at_a_few_angles_shows_steps_by_chance(stands: int) -> None:
+    rng = np.random.default_rng(stands)
+    grid = Grid(0, 0.2, 4500)
+
+    def seen() -> tuple[float, float]:
+        lengths = rng.exponential(1.0, stands)
+        ends = np.ceil(np.cumsum(lengths) / lengths.sum() * 18_000).astype(int)
+        angles = np.repeat(rng.uniform(-1.7, 1.7, stands), np.diff(ends, prepend=0))
+        readings = _readings(angles)
+        return standing_share(readings, grid), float(step_statistics(readings, grid)[0])
+
+    shares, steps = np.array([seen() for _ in range(40)]).T
+    # Of n lengths drawn like this the squares of the shares add up to 2 / n, four parts apart.
+    np.testing.assert_allclose(shares.mean(), 4 * 2.0 / stands, rtol=0.25)
+    allowed = [chance_of_steps(a, b) for a, b in zip(shares[::2], steps[1::2], strict=True)]
+    differences = (steps[::2] - steps[1::2]) / allowed
+    assert np.sqrt(np.mean(differences**2)) < 1.0
+    assert 3.5 < np.mean(steps / shares) < 6.5
+    # One that swings rests nowhere, in whatever steps its readings come.
+    swinging = 0.3 * lfilter([0.05], [1.0, -0.95], rng.standard_normal(18_000)) / 0.16
+    assert standing_share(_readings(swinging), grid) < 0.001
+    steps_of_two = np.radians(2.0)
+    coarse = _readings(steps_of_two * np.round(swinging / steps_of_two))
+    assert chance_of_steps(standing_share(coarse, grid), 1.0) < 0.02
+    assert step_statistics(coarse, grid)[0] > 0.9
+
+
+def test_a_vane_that_turns_round_once_has_the_eddies_that_it_has() -> None:
+    recording = recorded(STATION, 75)
+    comparison = prepare(recording)
+    readings = recording.angles["vane"]
+    middle = int(readings.time[readings.time.size // 2])
+    once_round = 2.0 * np.pi / (1.0 + np.exp(-(readings.time - middle) / 5e8))
+    turned = Angles(readings.time, np.angle(np.exp(1j * (readings.angle + once_round))))
+    seen = [comparison.observe({}, {"vane": r}) for r in (readings, turned)]
+    before, after = (s.statistics["vane/vane_angle"][:BANDS] for s in seen)
+    quick = slice(4, BANDS)
+    assert np.isfinite(before[quick]).any()
+    np.testing.assert_allclose(after[quick], before[quick], atol=0.15)
 
 
 def test_a_vane_that_creeps_and_jumps_is_stiller_than_one_that_swings() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.moving import Moving
 from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated, View
+from wind_sensors.diagnosis.comparing.raw_statistics.vanes import standing_share
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.comparing.turning import where_vanes_follow
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
@@ -116,6 +118,15 @@ class Comparison(View):
         """The same comparison with what is seen of the recording."""
         pulses, angles = self.recording.pulses, self.recording.angles
         return replace(self, measured=self.observe(pulses, angles, self.debounced))
+
+    @cached_property
+    def standing_shares(self) -> Mapping[str, float]:
+        """How far few stands make up the readings of each vane, by channel name."""
+        return {
+            c.name: standing_share(self.recording.angles[c.instrument], self.grid, self.mask)
+            for c in self.channels
+            if c.kind == "vane_angle"
+        }
 
     def where_vanes_follow(self, explanations: Iterable[Simulated]) -> FloatArray:
         """Weights that are zero while a vane and one of its simulations turn round apart, (n,)."""

@@ -302,18 +302,31 @@ class View:
         full[0] = np.sqrt(values.size) * np.mean(self.masked(values))
         return full
 
-    def _nearest_turn(
-        self, channel: Channel, deviation: FloatArray, time: FloatArray | None = None
-    ) -> FloatArray:
-        """Deviations of a vane moved by whole turns to where they are expected."""
+    def _nearest_turn(self, channel: Channel, deviation: FloatArray) -> FloatArray:
+        """Deviations of a vane at the bins, by whole turns where they are expected."""
         expected = self.expected.get(channel.name)
         if expected is None:
             return deviation
         expected = expected + self.departure.get(channel.name, 0.0)
-        if time is not None:
-            expected = np.interp(time, self.grid.centres, expected)
         turns = np.rint((deviation - expected) / (2.0 * np.pi))
         return np.asarray(deviation - 2.0 * np.pi * turns, dtype=np.float64)
+
+    def _without_jumps(
+        self, channel: Channel, deviation: FloatArray, time: FloatArray
+    ) -> FloatArray:
+        """Deviations of a vane's readings, continued where it turns round: to count it on another
+        turn would be a jump that it did not make, with more power than all its eddies.
+
+        Args:
+            channel: The vane's.
+            deviation: Of each reading [rad], shape (k,).
+            time: Of the readings [s], shape (k,).
+        """
+        followed = np.unwrap(deviation)
+        expected = self.expected.get(channel.name, np.zeros(self.grid.n))
+        expected = expected + self.departure.get(channel.name, 0.0)
+        apart = np.median(followed - np.interp(time, self.grid.centres, expected))
+        return np.asarray(followed - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)))
 
     def _vane_spectrum(self, readings: Angles, channel: Channel) -> FloatArray:
         time = self.grid.seconds(readings.time)
@@ -327,7 +340,7 @@ class View:
             return np.full(BANDS, np.nan)
         if not good.all():
             deviation = np.interp(time, time[good], deviation[good])
-        deviation = self._nearest_turn(channel, deviation, time)
+        deviation = self._without_jumps(channel, deviation, time)
         weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
         return self._log_spectrum(
             spectra.to_cosine(np.asarray(weighted)), dt, channel, HIGHEST_OF_READINGS / dt

@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, ch
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     ERRATIC,
     STILLNESS,
+    chance_of_steps,
     chance_of_stillness,
 )
 from wind_sensors.diagnosis.healthy.baseline import Baseline, ChannelBaseline
@@ -95,7 +96,8 @@ def _trust(
 
 
 def _chance(comparison: Comparison, simulated: Simulated, channel: Channel) -> FloatArray:
-    """Deviation of each statistic by which pulses chance has hit, and by readings' last digits."""
+    """Deviation of each statistic by which pulses chance has hit, by readings' last digits, and by
+    where a vane that sticks came to rest."""
     drawn, seen = (s.statistics[channel.name] for s in (simulated, comparison.measured))
     chance = np.zeros(drawn.size)
     if channel.kind == "rotor_rate":
@@ -106,6 +108,7 @@ def _chance(comparison: Comparison, simulated: Simulated, channel: Channel) -> F
         stillness = slice(BANDS, BANDS + STILLNESS)
         steps = BANDS + STILLNESS + ERRATIC
         chance[stillness] = chance_of_stillness(float(drawn[steps]), float(seen[steps]))
+        chance[steps] = chance_of_steps(comparison.standing_shares[channel.name], drawn[steps])
     return chance
 
 
