@@ -24,7 +24,11 @@ ERRATIC_STEP = np.radians(100.0)
 ERRATIC_INTERVAL = 120_000_000
 """Readings further apart [ns] are not judged by their steps."""
 
+FLOATING_STEP = np.radians(30.0)
+"""Of readings that are known to jump about at times, steps beyond this [rad] are jumps, too."""
+
 _ERRATIC_REACH = 150_000_000
+_ERRATIC_TOGETHER = 300_000_000
 _ERRATIC_PAUSE = 1_000_000_000
 
 
@@ -65,15 +69,10 @@ def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
         angles: Readings.
         least: Step between two readings that counts as a jump [rad].
     """
-    time, angle = angles.time, angles.angle
-    out = np.zeros(time.size, dtype=np.bool_)
-    if time.size < 2:
-        return out
-    step = np.diff(angle)
-    step = np.abs(step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)))
-    jump = np.flatnonzero((step > least) & (np.diff(time) <= ERRATIC_INTERVAL))
+    time = angles.time
+    jump = _jumps(angles, least)
     if jump.size == 0:
-        return out
+        return np.zeros(time.size, dtype=np.bool_)
     at = np.sort(np.concatenate((time[jump], time[jump + 1])))
     following = np.searchsorted(at, time)
     before = time - at[np.maximum(following - 1, 0)]
@@ -84,6 +83,36 @@ def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
         np.maximum(before, after) <= _ERRATIC_PAUSE
     )
     return np.asarray(close | between, dtype=np.bool_)
+
+
+def between_jumps(angles: Angles, least: float = FLOATING_STEP) -> BoolArray:
+    """Readings between jumps that follow each other within 0.3 s; shape (n,).
+
+    They tell the edges of a gap in which the wiper floats: the last good reading before them and
+    the first after them are none of them, though they are `erratic`. Now and then a number drawn by
+    chance at their beginning or end lies close to the truth, and is not among them either.
+
+    Args:
+        angles: Readings.
+        least: Step between two readings that counts as a jump [rad].
+    """
+    out = np.zeros(angles.time.size, dtype=np.bool_)
+    jump = _jumps(angles, least)
+    if jump.size < 2:
+        return out
+    parted = np.flatnonzero(np.diff(angles.time[jump]) > _ERRATIC_TOGETHER)
+    first = jump[np.concatenate(([0], parted + 1))]
+    last = jump[np.concatenate((parted, [jump.size - 1]))]
+    for begin, end in zip(first, last, strict=True):
+        out[begin + 1 : end + 1] = True
+    return out
+
+
+def _jumps(angles: Angles, least: float) -> npt.NDArray[np.intp]:
+    """Numbers of the readings after which the next one is a step of more than `least` away."""
+    step = np.diff(angles.angle)
+    step = np.abs(step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)))
+    return np.flatnonzero((step > least) & (np.diff(angles.time) <= ERRATIC_INTERVAL))
 
 
 @dataclass(frozen=True)

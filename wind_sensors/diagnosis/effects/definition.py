@@ -42,6 +42,7 @@ class Parameter:
             recording does not ask for another.
         value_from: The `fit`; the `signals`, which tell it better than a fit can; or several
             `forms` of the effect, each of which is tried as it is.
+        told_to: Standard error where the signals tell it.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Parameter:
     free: Callable[[Drive], bool] | None = None
     tied: float | None = None
     value_from: Literal["fit", "signals", "forms"] = "fit"
+    told_to: float = 0.0
 
     def is_free(self, drive: Drive) -> bool:
         """Whether what drives a recording lets it be fitted."""

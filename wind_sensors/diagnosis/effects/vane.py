@@ -295,7 +295,9 @@ POTENTIOMETER_GAP = Effect(
     occasional=True,
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),
-        Parameter("width", "deg", 0.0, 90.0, minimum=4.0, step=1.0, starts=(10.0, 20.0)),
+        Parameter(
+            "width", "deg", 0.0, 90.0, minimum=4.0, step=1.0, starts=(10.0, 20.0), told_to=0.3
+        ),
         Parameter("reading", "deg", -540.0, 540.0, healthy=None, step=2.0, wraps=360.0),
         Parameter("form", "1", 0.0, 2.0, healthy=None, value_from="forms"),
     ),

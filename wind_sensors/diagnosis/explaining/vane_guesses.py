@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.explaining.intervals import interval_of
 from wind_sensors.diagnosis.explaining.terms import Term, suggested
 from wind_sensors.station.model import Angle
-from wind_sensors.station.signals import BoolArray
+from wind_sensors.station.signals import BoolArray, between_jumps
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,7 +33,9 @@ LEAST_BESIDE_HOLE = 0.015
 usual degrees have, and so many degrees on either side have this share of all readings."""
 
 MANY_BESIDE_EDGE = 3
-"""A degree beside a gap with a floating wiper has so many readings; fewer are chance."""
+RARELY = 4.0
+"""A degree beside a gap with a floating wiper has so many readings, and so many standard deviations
+of chance, more than degrees inside have by chance."""
 
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
@@ -238,22 +240,37 @@ def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
         return []
     vane = channel.instrument
     centre, width = _sector(comparison, channel, wrong)
-    told = _told_gap(comparison, vane, wrong, lambda steady: _around(steady, centre))
+    loose = between_jumps(comparison.recording.angles[vane])
+    # As often as a step is no jump, the first and the last number of a visit lie that close to the
+    # truth, on either side: of each visit 1/180 to a degree, however large a jump has to be.
+    by_chance = np.count_nonzero(np.diff(loose.astype(np.int8)) > 0) / 180.0
+    told = _told_gap(comparison, vane, loose, lambda good: _around(good, centre, by_chance))
+    if told:
+        return told
     sectors = [(centre, share * width) for share in NARROWER]
-    return told + [
+    return [
         _gap(vane, *sector, 2)
         for sector in (*_mostly(comparison, channel, wrong, centre), *sectors)
     ]
 
 
-def _around(degrees: FloatArray, inside: float) -> tuple[float, float] | None:
-    """Centre and width of the sector without readings in which a direction lies [deg].
+def _around(
+    degrees: FloatArray, inside: float, by_chance: float
+) -> tuple[float, float] | None:
+    """Centre and width of the sector without good readings [deg].
 
-    A few readings in it may be chance; None: there are not many on either side.
+    Args:
+        degrees: Good readings.
+        inside: A direction in the sector.
+        by_chance: Number of readings to a degree that only seem good.
+
+    Returns:
+        None: there are not many readings on either side.
     """
     away = np.mod(degrees - inside + 180.0, 360.0) - 180.0
     counts, _ = np.histogram(away, np.arange(-180.0, 181.0))
-    many = np.flatnonzero(counts >= MANY_BESIDE_EDGE) - 180
+    least = MANY_BESIDE_EDGE + by_chance + RARELY * np.sqrt(by_chance)
+    many = np.flatnonzero(counts >= least) - 180
     if not np.any(many < 0) or not np.any(many >= 0):
         return None
     below, above = many[many < 0].max(), many[many >= 0].min()

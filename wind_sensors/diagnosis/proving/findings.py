@@ -113,7 +113,7 @@ def estimates_of(explanation: Fit) -> list[dict[str, Estimate]]:
             if parameter.name in term.held and parameter.healthy is None:
                 noise = parameter.step
             elif parameter.name in term.held:
-                noise = 0.0 if departure != 0.0 else np.inf
+                noise = parameter.told_to if departure != 0.0 else np.inf
             elif parameter.value_from == "signals" and parameter.graded:
                 noise = 0.0
             elif parameter.value_from == "signals" and parameter.step:
