@@ -93,7 +93,9 @@ def test_a_beginning_and_an_end_of_an_effect_that_depends_on_the_direction() -> 
     assert end == pytest.approx(290.0, abs=15.0)
 
 
-@pytest.mark.parametrize("interval", [(170.0, None), (110.0, 260.0)])
+@pytest.mark.parametrize(
+    "interval", represented([(170.0, None), (110.0, 260.0)], by=((170.0, None),))
+)
 def test_a_counter_that_loses_what_follows_too_soon_for_a_while(
     interval: tuple[float, float | None],
 ) -> None:

@@ -224,7 +224,9 @@ def test_a_grease_tells_nothing_of_its_stiffening_within_minutes_at_one_temperat
         assert (fitted.values["temperature_coefficient"] != 0.0) is tells
 
 
-@pytest.mark.parametrize(("begin", "end"), [(150.3, None), (100.7, 290.1)])
+@pytest.mark.parametrize(("begin", "end"), [
+    (150.3, None), pytest.param(100.7, 290.1, marks=pytest.mark.slow),
+])  # fmt: skip
 def test_stamps_that_are_late_from_some_moment_on_jump_there(
     begin: float, end: float | None
 ) -> None:
