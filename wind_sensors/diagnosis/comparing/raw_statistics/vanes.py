@@ -87,6 +87,9 @@ STEPS_OF_STANDS = 4.2
 `standing_share`: of M independent waves the largest has log M + 0.6 times that share (5.5 for 130)
 where no rest is much longer than the others; 3.6 to 4.4 in four recordings of vanes that stick."""
 
+SWINGING = 0.001
+"""`standing_share` of a vane that swings is less (0.0002 to 0.0005 on healthy days)."""
+
 STANDS_KNOWN_TO = 0.5
 """How long such a vane rests is simulated to about this share."""
 
@@ -190,7 +193,8 @@ def chance_of_steps(standing: float, other_steps: float) -> float:
         standing: `standing_share` of one.
         other_steps: `step_statistics` of the other.
     """
-    return STANDS_KNOWN_TO * min(STEPS_OF_STANDS * standing, other_steps)
+    rests = STEPS_OF_STANDS * max(standing - SWINGING, 0.0)
+    return STANDS_KNOWN_TO * min(rests, other_steps)
 
 
 COARSE_STILLNESS = 1.5
