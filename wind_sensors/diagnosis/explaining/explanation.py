@@ -179,16 +179,25 @@ def judged(
         return again, evidence(again, whitener)
 
     how = (roughly, iterations)
-    new = [e for e in explanations if searcher.judgements.find((e, named), how) is None]
+    known = {
+        k: judgement
+        for k, candidate in enumerate(explanations)
+        if (judgement := searcher.judgements.find((candidate, named), how)) is not None
+    }
+    new = [k for k in range(len(explanations)) if k not in known]
     found = in_parallel(
-        one, new, searcher.workers, work=lambda candidate: len(parameters_of(candidate.terms))
+        one,
+        [explanations[k] for k in new],
+        searcher.workers,
+        work=lambda candidate: len(parameters_of(candidate.terms)),
     )
-    for candidate, judgement in zip(new, found, strict=True):
-        searcher.judgements.keep((candidate, named), judgement, how)
-    known = [searcher.judgements.find((e, named), how) for e in explanations]
+    for k, judgement in zip(new, found, strict=True):
+        known[k] = judgement
+        searcher.judgements.keep((explanations[k], named), judgement, how)
+    ranked = sorted((known[k] for k in range(len(explanations))), key=itemgetter(1))
     return [
         Judged(again, value, partial(searcher.whitener, again.simulated, named))
-        for again, value in sorted((k for k in known if k is not None), key=itemgetter(1))
+        for again, value in ranked
     ]
 
 
