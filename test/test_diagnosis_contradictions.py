@@ -13,6 +13,7 @@ from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.explaining import leading, rounds
+from wind_sensors.diagnosis.explaining.beside import Beside
 from wind_sensors.diagnosis.explaining.explanation import (
     Judged,
     Naming,
@@ -23,7 +24,7 @@ from wind_sensors.diagnosis.explaining.explanation import (
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.leading import held_throughout
 from wind_sensors.diagnosis.explaining.moves import looked_around
-from wind_sensors.diagnosis.explaining.rounds import Beside, best_beside
+from wind_sensors.diagnosis.explaining.rounds import best_beside
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
 from wind_sensors.diagnosis.healthy.noise_level import Excess

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from wind_sensors.diagnosis.explaining.beside import Beside
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
@@ -33,7 +34,6 @@ from wind_sensors.diagnosis.explaining.onsets import with_interval
 from wind_sensors.diagnosis.explaining.pairs import better_pair
 from wind_sensors.diagnosis.explaining.rounds import (
     CONTENDERS,
-    Beside,
     FirstRound,
     best_beside,
     best_single,
