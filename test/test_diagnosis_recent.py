@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from diagnosis_cases import STATION, baseline, recorded
 
+from wind_sensors.diagnosis.comparing.preparing import prepare
+from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.explaining.explanation import judged
+from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.recent import Recent
+from wind_sensors.diagnosis.explaining.search import searcher_of
+from wind_sensors.diagnosis.explaining.terms import Term
 
 
 def test_results_are_kept_for_the_very_objects_and_the_oldest_is_forgotten() -> None:
@@ -24,3 +31,17 @@ def test_results_are_kept_for_the_very_objects_and_the_oldest_is_forgotten() -> 
     recent.keep((last,), 3)
     assert recent.find((first, None), how="roughly") is None
     assert recent.of((equal, last), computed) == 11
+
+
+def test_an_explanation_is_judged_though_its_judgement_is_not_kept() -> None:
+    searcher = searcher_of(prepare(recorded(STATION, 84)), baseline(), catalogue(), {})
+    searcher.judgements = Recent(1)
+    null = searcher.whitener(searcher.bank.without)
+    gain = catalogue()["calibration_drift"]
+    fits = [
+        fit(null, STATION, [Term(gain, "cup", {"gain": value})], iterations=0)
+        for value in (0.99, 1.01)
+    ]
+    first, again = judged(searcher, fits), judged(searcher, fits)
+    assert len(first) == len(again) == len(fits)
+    assert [r.evidence for r in again] == [r.evidence for r in first]
