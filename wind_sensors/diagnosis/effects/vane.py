@@ -127,9 +127,9 @@ def _imbalance(entry: Entry, values: Values) -> dict[str, Any]:
     }
 
 
-MOST_IMBALANCE = 10.0
+MOST_IMBALANCE = 20.0
 """[1/m]. The moment of mass over the moment of inertia is at most one over the radius of gyration,
-for the centre of mass lies no farther out; a vane's is ten centimetres and more."""
+for the centre of mass lies no farther out; that of the smallest vanes is five centimetres."""
 
 SMALLEST_IMBALANCE = 0.15
 """Worth reporting on a carrier that rolls or accelerates [1/m]."""
@@ -138,9 +138,9 @@ MOST_LEAN_DEG = 6.0
 """In each direction: gravity turns a vane on a mast that looks upright. More would deflect the flow
 along the vane, which is another effect."""
 
-USUAL_IMBALANCE = 6.0
-"""[1/m]. On a mast that looks upright only the product with its lean is seen: that of a vane with a
-counterweight too few, for which the lean is then told."""
+USUAL_IMBALANCE = 15.0
+"""[1/m]. On a mast that looks upright only the product with its lean is seen: with that of a small
+vane without its counterweight, leans that look upright reach as far as gravity does."""
 
 TEMPLATE_IMBALANCE = 0.3
 """[1/m]. With leans of 3 degrees: a healthy vane's own lean is among what stands in it."""
@@ -176,7 +176,7 @@ VANE_IMBALANCE = Effect(
     meaning="The vane's centre of mass lies off its axis, so that tilt and acceleration turn it.",
     entrance="response",
     equation="phi'' += b (-g_x sin(phi) + g_y cos(phi)); on a mast at rest only b times the lean "
-    "is seen, and b is set to 6 1/m",
+    "is seen, and b is set to 15 1/m",
     source="derived: pendulum term of a vane on a leaning axis",
     region="low speeds, on a mount that leans or accelerates",
     occasional=True,
@@ -187,11 +187,11 @@ VANE_IMBALANCE = Effect(
             step=0.05, starts=(0.5, -0.5, 2.5, -2.5), free=_has_attitude, tied=USUAL_IMBALANCE,
         ),
         Parameter(
-            "tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.1, starts=(2.0, -2.0),
+            "tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.04, starts=(0.8, -0.8),
             free=_has_no_attitude,
         ),
         Parameter(
-            "tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.1, starts=(2.0, -2.0),
+            "tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.04, starts=(0.8, -0.8),
             free=_has_no_attitude,
         ),
     ),
