@@ -28,9 +28,8 @@ from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.terms import Term, planted
-from wind_sensors.diagnosis.explaining.vane_guesses import vane_guesses
 from wind_sensors.diagnosis.verdict import diagnose
-from wind_sensors.station.model import Angle, Cup
+from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Angles, Pulses, erratic_readings
 
 SECOND = 1_000_000_000
@@ -257,31 +256,6 @@ def test_a_limit_makes_the_largest_changes_smaller_than_damping_does() -> None:
 def test_too_little_change_says_nothing(size: int, still: float) -> None:
     series = still * np.random.default_rng(9).standard_normal(size)
     assert change_statistics(series, windy_changes(np.full(size, 5.0))).tolist() == [0.0]
-
-
-@pytest.mark.parametrize("width", [4.0, 30.0])
-def test_the_edges_of_a_gap_in_which_the_wiper_floats_are_read_off(width: float) -> None:
-    rng = np.random.default_rng(77)
-    recording = recorded(STATION, 75)
-    readings = recording.angles["vane"]
-    true = float(np.degrees(np.median(np.unwrap(readings.angle))))
-    away = np.degrees(readings.angle) - true
-    floating = np.abs((away + 180.0) % 360.0 - 180.0) < 0.5 * width
-    numbers = rng.uniform(-np.pi, np.pi, floating.sum())
-    broken = Angles(readings.time, readings.angle.copy())
-    broken.angle[floating] = numbers
-    comparison = prepare(replace(recording, angles={**recording.angles, "vane": broken}))
-    (channel,) = (c for c in comparison.channels if c.kind == "vane_angle")
-    vane = STATION.instrument("vane")
-    assert isinstance(vane, Angle)
-    (gap,) = (
-        term
-        for term in vane_guesses(comparison, channel, vane)
-        if term.effect.name == "potentiometer_gap" and term.values["form"] == 2.0
-    )
-    assert gap.values["width"] == pytest.approx(width, abs=0.3)
-    assert (gap.values["centre"] - true + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.2)
-    assert {"centre", "width"} <= gap.held
 
 
 @pytest.mark.parametrize("form", represented([0.0, 1.0, 2.0], by=(1.0,)))

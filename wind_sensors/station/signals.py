@@ -24,8 +24,17 @@ ERRATIC_STEP = np.radians(100.0)
 ERRATIC_INTERVAL = 120_000_000
 """Readings further apart [ns] are not judged by their steps."""
 
-FLOATING_STEP = np.radians(30.0)
-"""Of readings that are known to jump about at times, steps beyond this [rad] are jumps, too."""
+FLOATING_STEP = (np.radians(3.0), np.radians(30.0))
+TIMES_USUAL_STEP = 4.0
+"""Of readings that are known to jump about at times, steps are jumps, too, that are so many times
+as large as all but a hundredth of the others, within these bounds [rad]."""
+
+MANY_RETURNS = (12.0, 24.0)
+"""A vane comes back to a number that stands for no direction this often: less than the first it is
+none, from the second on it is one; and by the same ratio more often than to any other number."""
+
+_FEW_RETURNS = 4.0
+_SAME_NUMBER = np.radians(0.001)
 
 _ERRATIC_REACH = 150_000_000
 _ERRATIC_TOGETHER = 300_000_000
@@ -55,8 +64,49 @@ class Angles:
 
     @cached_property
     def erratic(self) -> BoolArray:
-        """Readings that jump by at least `ERRATIC_STEP`, see `erratic_readings`; shape (n,)."""
-        return erratic_readings(self)
+        """Readings that jump about, see `erratic_readings`; shape (n,).
+
+        By `ERRATIC_STEP`, or by `floating_step` where some do by as much: numbers drawn by chance
+        that pass for good ones have more power than all eddies.
+        """
+        wrong = erratic_readings(self)
+        return erratic_readings(self, self.floating_step) if wrong.any() else wrong
+
+    @cached_property
+    def floating_step(self) -> float:
+        """Step between two readings that counts as a jump where some jump about [rad]."""
+        wrong = erratic_readings(self)
+        steps = _steps(self)[~(wrong[1:] | wrong[:-1])]
+        usual = float(np.quantile(steps, 0.99)) if steps.size else np.inf
+        return float(np.clip(TIMES_USUAL_STEP * usual, *FLOATING_STEP))
+
+    @cached_property
+    def at_one_number(self) -> FloatArray:
+        """How far readings are one number again and again, see `at_one_number`; shape (n,)."""
+        return at_one_number(self)
+
+
+def at_one_number(angles: Angles) -> FloatArray:
+    """How far each reading is the number that a vane shows where it has no reading; 0 to 1, (n,).
+
+    A potentiometer's gap may read one end of its track. The vane comes back to that number again
+    and again, and to no other one half as often; one that sticks rests here and there, and coarse
+    readings share their returns.
+
+    Args:
+        angles: Readings.
+    """
+    number = np.rint(np.where(np.isfinite(angles.angle), angles.angle, np.inf) / _SAME_NUMBER)
+    stays = np.flatnonzero(np.isfinite(number[1:]) & (number[1:] == number[:-1]))
+    if stays.size < MANY_RETURNS[0]:
+        return np.zeros(number.size)
+    begins = stays[np.diff(stays, prepend=-2) > 1]
+    numbers, returns = np.unique(number[begins], return_counts=True)
+    most = int(np.argmax(returns))
+    other = max(float(np.max(np.delete(returns, most), initial=0)), _FEW_RETURNS)
+    least, sure = (count / _FEW_RETURNS for count in MANY_RETURNS)
+    share = np.clip((returns[most] / other - least) / (sure - least), 0.0, 1.0)
+    return np.where(number == numbers[most], float(share), 0.0)
 
 
 def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
@@ -85,7 +135,7 @@ def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
     return np.asarray(close | between, dtype=np.bool_)
 
 
-def between_jumps(angles: Angles, least: float = FLOATING_STEP) -> BoolArray:
+def between_jumps(angles: Angles) -> BoolArray:
     """Readings between jumps that follow each other within 0.3 s; shape (n,).
 
     They tell the edges of a gap in which the wiper floats: the last good reading before them and
@@ -94,10 +144,9 @@ def between_jumps(angles: Angles, least: float = FLOATING_STEP) -> BoolArray:
 
     Args:
         angles: Readings.
-        least: Step between two readings that counts as a jump [rad].
     """
     out = np.zeros(angles.time.size, dtype=np.bool_)
-    jump = _jumps(angles, least)
+    jump = _jumps(angles, angles.floating_step)
     if jump.size < 2:
         return out
     parted = np.flatnonzero(np.diff(angles.time[jump]) > _ERRATIC_TOGETHER)
@@ -110,9 +159,13 @@ def between_jumps(angles: Angles, least: float = FLOATING_STEP) -> BoolArray:
 
 def _jumps(angles: Angles, least: float) -> npt.NDArray[np.intp]:
     """Numbers of the readings after which the next one is a step of more than `least` away."""
+    return np.flatnonzero((_steps(angles) > least) & (np.diff(angles.time) <= ERRATIC_INTERVAL))
+
+
+def _steps(angles: Angles) -> FloatArray:
+    """Angles between successive readings, the shorter way round [rad]; shape (n - 1,)."""
     step = np.diff(angles.angle)
-    step = np.abs(step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)))
-    return np.flatnonzero((step > least) & (np.diff(angles.time) <= ERRATIC_INTERVAL))
+    return np.abs(step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)))
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,9 @@ HIGHEST_OF_READINGS = 0.4
 
 BANDS = len(NORMALISED_BANDS) - 1
 
+FOLLOWED_FOR = 0.5
+"""A vane is followed round by its mean readings of so long [s]."""
+
 LEAST_COUNTED = 0.01
 """A record is never taken to count for less than this share of its time."""
 
@@ -160,6 +163,11 @@ class View:
         As much less is known than of a whole one.
         """
         return 1.0 if self.mask is None else max(float(np.mean(self.mask**2)), LEAST_COUNTED)
+
+    @property
+    def counted_time(self) -> float:
+        """So much of the record counts [s]."""
+        return self.counted_share * self.grid.n * self.grid.dt
 
     @cached_property
     def mean_speed(self) -> float:
@@ -322,7 +330,13 @@ class View:
             deviation: Of each reading [rad], shape (k,).
             time: Of the readings [s], shape (k,).
         """
-        followed = np.unwrap(deviation)
+        # A number drawn by chance among the readings must not carry those that follow it round.
+        block = np.floor((time - time[0]) / FOLLOWED_FOR).astype(np.intp)
+        turned = np.bincount(block, np.cos(deviation)) + 1j * np.bincount(block, np.sin(deviation))
+        some = np.flatnonzero(np.bincount(block))
+        path = np.unwrap(np.angle(turned[some]))
+        path = np.interp(time, time[0] + FOLLOWED_FOR * (some + 0.5), path)
+        followed = path + wrap(deviation - path)
         expected = self.expected.get(channel.name, np.zeros(self.grid.n))
         expected = expected + self.departure.get(channel.name, 0.0)
         apart = np.median(followed - np.interp(time, self.grid.centres, expected))
@@ -338,10 +352,9 @@ class View:
         good = np.isfinite(deviation) & ~readings.erratic
         if not good.any():
             return np.full(BANDS, np.nan)
-        if not good.all():
-            deviation = np.interp(time, time[good], deviation[good])
-        deviation = self._without_jumps(channel, deviation, time)
-        weighted = deviation * np.interp(time, self.grid.centres, self.masked(self.speed))
+        followed = self._without_jumps(channel, deviation[good], time[good])
+        followed = np.interp(time, time[good], followed)
+        weighted = followed * np.interp(time, self.grid.centres, self.masked(self.speed))
         return self._log_spectrum(
             spectra.to_cosine(np.asarray(weighted)), dt, channel, HIGHEST_OF_READINGS / dt
         )

@@ -296,7 +296,7 @@ def inexact(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) -> fl
         more: One with further effects.
     """
     gained = gained_alike(searcher, whitener, fewer, more)
-    if all(term.effect.exact for term in fewer.terms):
+    if all(term.has_certain_form for term in fewer.terms):
         share, largest = FURTHER_EXACT_SHARE, LARGEST_EXACT_INEXACTNESS
         least = LEAST_EXACT_SHARE_BESIDE
     else:

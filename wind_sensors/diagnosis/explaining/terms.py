@@ -64,6 +64,14 @@ class Term:
         return parameter.value_from == "fit" and parameter.name not in self.held
 
     @property
+    def has_certain_form(self) -> bool:
+        """Whether nothing that others leave beside it can be its own form: that is certain, or the
+        signals tell how large it is."""
+        return self.effect.exact or any(
+            p.told_to > 0.0 and p.name in self.held for p in self.effect.parameters
+        )
+
+    @property
     def is_told(self) -> bool:
         """Whether the signals tell everything about it, that it is this among it."""
         return self.effect.unmistakable

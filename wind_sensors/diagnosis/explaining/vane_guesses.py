@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -36,6 +35,11 @@ MANY_BESIDE_EDGE = 3
 RARELY = 4.0
 """A degree beside a gap with a floating wiper has so many readings, and so many standard deviations
 of chance, more than degrees inside have by chance."""
+
+BESIDE_EDGE = 3.0
+LEAST_BESIDE_EDGE = 15
+"""So many degrees beside it tell how often the vane stands there; fewer readings do not tell where
+it begins."""
 
 LEAST_ERRATIC = 0.004
 """Share of erratic readings from which a gap with a floating wiper is considered."""
@@ -127,9 +131,11 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
         if common.size == 1:
             beside = [(low + 5.0 * side, 10.0) for side in (-1.0, 1.0)]
             there = np.abs(np.degrees(delivered) - low) < SAME_VALUE
+            told = _told_gap(comparison, channel, there, reading=low)
+            if told:
+                return [*(t for t in out if t.effect.name != "potentiometer_gap"), *told]
             sectors = [_sector(comparison, channel, there), *([hole] if hole else beside)]
             out.extend(_gap(vane, *sector, 1, low) for sector in sectors)
-            out.extend(_told_gap(comparison, vane, there, hole_between, low))
             out.extend(_gap(vane, *sector) for sector in sectors)
         else:
             width = high - low
@@ -143,29 +149,31 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
 
 def _told_gap(
     comparison: Comparison,
-    vane: str,
+    channel: Channel,
     there: BoolArray,
-    between: Callable[[FloatArray], tuple[float, float] | None],
+    by_chance: float = 0.0,
     reading: float | None = None,
 ) -> list[Term]:
     """A gap in which the vane reads something else, for as long as it reads nothing in it.
 
     Args:
         comparison: The recording.
-        vane: Its name.
+        channel: The vane's.
         there: Readings that are made in the gap, shape (n,).
-        between: Centre and width [deg] of a gap among the other readings [deg], if there is one.
+        by_chance: Number of readings to a degree that only seem to be made outside.
         reading: What the vane reads there [deg]; None: anything.
 
     Returns:
-        Nothing where other directions are missing in that time, too, or none are.
+        Nothing where the readings beside it are too few in that time to tell its edges.
     """
+    vane = channel.instrument
     readings = comparison.recording.angles[vane]
     degrees, time = np.degrees(readings.angle), comparison.grid.seconds(readings.time)
     other = np.isfinite(degrees) & ~there
     (inside,) = np.nonzero(there)
     begin, end = inside[0], inside[-1]
-    sector = between(degrees[begin : end + 1][other[begin : end + 1]])
+    nose = np.degrees(headings(comparison, channel))[there]
+    sector = _around(degrees[begin : end + 1][other[begin : end + 1]], nose, by_chance)
     if sector is None:
         return []
     centre, width = sector
@@ -244,7 +252,7 @@ def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     # As often as a step is no jump, the first and the last number of a visit lie that close to the
     # truth, on either side: of each visit 1/180 to a degree, however large a jump has to be.
     by_chance = np.count_nonzero(np.diff(loose.astype(np.int8)) > 0) / 180.0
-    told = _told_gap(comparison, vane, loose, lambda good: _around(good, centre, by_chance))
+    told = _told_gap(comparison, channel, loose, by_chance)
     if told:
         return told
     sectors = [(centre, share * width) for share in NARROWER]
@@ -255,29 +263,59 @@ def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
 
 
 def _around(
-    degrees: FloatArray, inside: float, by_chance: float
+    degrees: FloatArray, inside: FloatArray, by_chance: float
 ) -> tuple[float, float] | None:
     """Centre and width of the sector without good readings [deg].
 
     Args:
         degrees: Good readings.
-        inside: A direction in the sector.
+        inside: Where the nose should have been at those in the sector, within some degrees.
         by_chance: Number of readings to a degree that only seem good.
 
     Returns:
         None: there are not many readings on either side.
     """
-    away = np.mod(degrees - inside + 180.0, 360.0) - 180.0
-    counts, _ = np.histogram(away, np.arange(-180.0, 181.0))
     least = MANY_BESIDE_EDGE + by_chance + RARELY * np.sqrt(by_chance)
-    many = np.flatnonzero(counts >= least) - 180
-    if not np.any(many < 0) or not np.any(many >= 0):
+    counts, _ = np.histogram(np.mod(degrees, 360.0), np.arange(361.0))
+    if not np.any(counts >= least):
         return None
-    below, above = many[many < 0].max(), many[many >= 0].min()
-    low, high = float(away[away < below + 1].max()), float(away[away >= above].min())
+    first = int(np.argmax(counts >= least))
+    few = np.append(np.roll(counts, -first) < least, False)
+    edges = np.diff(few.astype(np.int8))
+    begins, ends = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
+    expected, _ = np.histogram(np.mod(inside - first, 360.0), np.arange(361.0))
+    held = [int(np.sum(expected[begin:end])) for begin, end in zip(begins, ends, strict=True)]
+    if not any(held):
+        return None
+    begin, end = begins[np.argmax(held)], ends[np.argmax(held)]
+    away = np.mod(degrees - first, 360.0)
+    before, after = begin - away, np.mod(away - end + 180.0, 360.0) - 180.0
+    for beside in (before, after):
+        near = np.count_nonzero((beside >= 0.0) & (beside < BESIDE_EDGE))
+        if near < LEAST_BESIDE_EDGE + BESIDE_EDGE * by_chance:
+            return None
+    low, high = begin - _edge(before, by_chance), end + _edge(after, by_chance)
     if high - low > WIDEST_HOLE:
         return None
-    return (inside + 0.5 * (low + high)) % 360.0, high - low
+    return float((first + 0.5 * (low + high)) % 360.0), float(high - low)
+
+
+def _edge(away: FloatArray, by_chance: float) -> float:
+    """The least of many values where those below are few [deg].
+
+    Where a Poisson process changes its rate, by maximum likelihood.
+
+    Args:
+        away: Values, the degree from 0 on has many.
+        by_chance: Number of those to a degree that are few.
+    """
+    near = np.sort(away[(away >= -1.0) & (away < BESIDE_EDGE)])
+    few = max(by_chance, 0.5)
+    before = np.arange(near.size)
+    many = near.size - before
+    among = np.maximum(BESIDE_EDGE - near, 1e-3)
+    likely = before * np.log(few) - few * (near + 1.0) + many * np.log(many / among) - many
+    return float(near[np.argmax(np.where(near < 1.0, likely, -np.inf))])
 
 
 def _mostly(

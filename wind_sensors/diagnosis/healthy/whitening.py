@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, ch
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     ERRATIC,
     STILLNESS,
+    chance_of_erratic,
     chance_of_steps,
     chance_of_stillness,
 )
@@ -97,7 +98,7 @@ def _trust(
 
 def _chance(comparison: Comparison, simulated: Simulated, channel: Channel) -> FloatArray:
     """Deviation of each statistic by which pulses chance has hit, by readings' last digits, and by
-    where a vane that sticks came to rest."""
+    where a vane pointed or came to rest."""
     drawn, seen = (s.statistics[channel.name] for s in (simulated, comparison.measured))
     chance = np.zeros(drawn.size)
     if channel.kind == "rotor_rate":
@@ -105,8 +106,11 @@ def _chance(comparison: Comparison, simulated: Simulated, channel: Channel) -> F
         edges = comparison.recording.pulses[channel.instrument].time.size
         chance[intervals] = chance_of_intervals(drawn[intervals], seen[intervals], edges)
     else:
-        stillness = slice(BANDS, BANDS + STILLNESS)
-        steps = BANDS + STILLNESS + ERRATIC
+        erratic = BANDS + STILLNESS
+        stillness, steps = slice(BANDS, erratic), erratic + ERRATIC
+        chance[erratic:steps] = chance_of_erratic(
+            float(drawn[erratic]), float(seen[erratic]), comparison.counted_time
+        )
         chance[stillness] = chance_of_stillness(float(drawn[steps]), float(seen[steps]))
         chance[steps] = chance_of_steps(comparison.standing_shares[channel.name], drawn[steps])
     return chance

@@ -275,7 +275,7 @@ def verdict_of(
     asked_for = located_p <= REMAINDER_P or naming.gain > certain
     if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
         return "none"
-    forms = sum(not term.effect.exact for term in naming.fit.terms)
+    forms = sum(not term.has_certain_form for term in naming.fit.terms)
     product = REMAINDER_SHARE * max(forms, 1) ** 2
     sizeable = share > max(product / max(remainder.score, 1e-9), LEAST_REMAINDER)
     bent = any(len(term.effect.parameters) >= FREELY_BENT for term in naming.fit.terms)
