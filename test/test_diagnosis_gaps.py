@@ -65,7 +65,9 @@ def test_a_number_to_which_a_vane_returns_is_told(
     angle = swinging(seed)
     gone = np.abs(angle - centre) < 0.5 * width
     seen = readings(np.where(gone, number, angle)).at_one_number
-    np.testing.assert_array_equal(seen > 0.0, gone if seen.any() else False)
+    if seen.any():
+        chance = np.abs(angle - number) < 1e-4
+        np.testing.assert_array_equal((seen > 0.0) | chance, gone | chance)
     stays = np.count_nonzero(gone[1:] & gone[:-1] & ~np.concatenate(([False], gone[:-2])))
     assert seen.max() == (0.0 if stays < 12 else 1.0) or 12 <= stays < 24
 
