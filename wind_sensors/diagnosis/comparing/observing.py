@@ -51,9 +51,6 @@ HIGHEST_OF_READINGS = 0.4
 
 BANDS = len(NORMALISED_BANDS) - 1
 
-FOLLOWED_FOR = 0.5
-"""A vane is followed round by its mean readings of so long [s]."""
-
 LEAST_COUNTED = 0.01
 """A record is never taken to count for less than this share of its time."""
 
@@ -327,16 +324,10 @@ class View:
 
         Args:
             channel: The vane's.
-            deviation: Of each reading [rad], shape (k,).
-            time: Of the readings [s], shape (k,).
+            deviation: Of each good reading [rad], shape (k,).
+            time: Of those [s], shape (k,).
         """
-        # A number drawn by chance among the readings must not carry those that follow it round.
-        block = np.floor((time - time[0]) / FOLLOWED_FOR).astype(np.intp)
-        turned = np.bincount(block, np.cos(deviation)) + 1j * np.bincount(block, np.sin(deviation))
-        some = np.flatnonzero(np.bincount(block))
-        path = np.unwrap(np.angle(turned[some]))
-        path = np.interp(time, time[0] + FOLLOWED_FOR * (some + 0.5), path)
-        followed = path + wrap(deviation - path)
+        followed = np.unwrap(deviation)
         expected = self.expected.get(channel.name, np.zeros(self.grid.n))
         expected = expected + self.departure.get(channel.name, 0.0)
         apart = np.median(followed - np.interp(time, self.grid.centres, expected))
