@@ -90,6 +90,10 @@ def test_small_numbers_drawn_by_chance_are_told_where_others_are_large() -> None
     assert wrong[2500] and wrong[1000:1100].all()
     assert np.count_nonzero(wrong) < 130
     assert not readings(swinging(4)).erratic.any()
+    missing = angle.copy()
+    missing[200:220] = np.nan
+    told = ~np.isnan(missing)
+    np.testing.assert_array_equal(readings(missing).erratic[told], wrong[told])
 
 
 @pytest.mark.parametrize("width", [4.0, 30.0])

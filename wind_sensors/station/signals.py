@@ -77,6 +77,7 @@ class Angles:
         """Step between two readings that counts as a jump where some jump about [rad]."""
         wrong = erratic_readings(self)
         steps = _steps(self)[~(wrong[1:] | wrong[:-1])]
+        steps = steps[np.isfinite(steps)]
         usual = float(np.quantile(steps, 0.99)) if steps.size else np.inf
         return float(np.clip(TIMES_USUAL_STEP * usual, *FLOATING_STEP))
 
@@ -90,7 +91,7 @@ def at_one_number(angles: Angles) -> FloatArray:
     """How far each reading is the number that a vane shows where it has no reading; 0 to 1, (n,).
 
     A potentiometer's gap may read one end of its track. The vane comes back to that number again
-    and again, and to no other one half as often; one that sticks rests here and there, and coarse
+    and again, and far less often to any other; one that sticks rests here and there, and coarse
     readings share their returns.
 
     Args:
