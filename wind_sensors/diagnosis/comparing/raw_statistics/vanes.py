@@ -45,7 +45,7 @@ def erratic_statistics(
 
 ALONE_FOR = 1.5
 """Where a vane points is one draw for so long [s]: half of its turning follows eddies that the
-reference knows. In 24 recordings with gaps (4 to 48 % of the readings) the shares depart from the
+reference knows. In 24 recordings with gaps (4 to 50 % of the readings) the shares depart from the
 simulated ones by 1.0 times what this lets be chance."""
 
 
