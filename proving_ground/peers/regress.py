@@ -22,6 +22,7 @@ from proving_ground.inflow import Array
 from proving_ground.peers.methods import METHODS, Method, require_peers
 from proving_ground.sealing.seal import HEALTHY, RECORDINGS
 from proving_ground.sealing.trial import read_manifest
+from wind_sensors.processes import ONE_THREAD
 
 REGRESSORS = "regressors"
 LONGEST_MEMORY = 20
@@ -109,7 +110,7 @@ def regressor_file(folder: Path, recording: Path) -> Path:
 def _collect(item: tuple[Path, Path]) -> None:
     source, target = item
     root = str(Path(__file__).resolve().parents[2])
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, **ONE_THREAD}
     environment["PYTHONPATH"] = os.pathsep.join(
         filter(None, [root, environment.get("PYTHONPATH", "")])
     )

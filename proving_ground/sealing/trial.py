@@ -22,6 +22,7 @@ import wind_sensors
 from proving_ground.sealing.seal import HEALTHY, MANIFEST, RECORDINGS
 from wind_sensors import __version__
 from wind_sensors.errors import UserError
+from wind_sensors.processes import ONE_THREAD
 
 RUNS = "runs"
 RUN_FILE = "run.json"
@@ -202,7 +203,7 @@ def _supervise(command: Sequence[str], room: Path, log: Path, timeout: float) ->
     root = str(Path(__file__).resolve().parents[2])
     known = environment.get("PYTHONPATH", "")
     environment["PYTHONPATH"] = f"{root}{os.pathsep}{known}" if known else root
-    environment["OMP_NUM_THREADS"] = environment["OPENBLAS_NUM_THREADS"] = "1"
+    environment.update(ONE_THREAD)
     begun = time.monotonic()
     with log.open("wb") as output:
         process = subprocess.Popen(

@@ -10,6 +10,7 @@ from importlib import import_module
 from importlib.util import find_spec
 
 from wind_sensors.errors import UserError
+from wind_sensors.processes import one_thread_of_linear_algebra
 
 COMMANDS: dict[str, str] = {
     "simulate": "wind to signals: write the recording a station would make",
@@ -46,9 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 on success, 1 on a judgement that the user asked for, 2 on bad input.
     """
-    # Commands fork processes of their own; the threads of each one's linear algebra, waiting in
-    # loops for each other, would more than double the time. Numpy reads this when first imported.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    one_thread_of_linear_algebra()
     given = list(sys.argv[1:] if arguments is None else arguments)
     commands = {name: text for name, text in COMMANDS.items() if find_spec(module_of(name))}
     chosen = given[0] if given and given[0] in commands else None

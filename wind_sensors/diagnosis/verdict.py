@@ -241,7 +241,7 @@ def diagnose(
         recording: With a reference wind.
         baseline: What is normal for the station.
         effects: Catalogue; None: all known effects.
-        workers: Processes.
+        workers: Processes; see `wind_sensors.processes` before asking for more than one.
         progress: Called with a phase and the share of it that is done.
         with_proof: Fit and score held-out blocks.
 

@@ -28,6 +28,7 @@ from wind_sensors.nodes.station_parameters import (
     station_table,
     station_with,
 )
+from wind_sensors.processes import one_thread_of_linear_algebra
 from wind_sensors.station.inputs import field_path, field_value, resolved, scaled
 from wind_sensors.station.model import Input, Station
 
@@ -378,6 +379,7 @@ def _baseline(file: str) -> Baseline | None:
 
 def _process_beside() -> ProcessPoolExecutor:
     """One process that works while this one listens; interrupts are this one's business."""
+    one_thread_of_linear_algebra()
     return ProcessPoolExecutor(
         1,
         mp_context=multiprocessing.get_context("spawn"),
