@@ -76,9 +76,7 @@ def recorded(
     turn = np.radians(20.0 * rng.standard_normal()) + _noise(rng, n, 80.0, 0.5)
     turn = turn + _noise(rng, n, 2.0, 0.1)
     turn = turn + swing * np.sin(2.0 * np.pi * DT * np.arange(n) / 45.0)
-    wind = np.stack(
-        (speed * np.cos(turn), speed * np.sin(turn), _noise(rng, n, 1.0, 0.35)), axis=1
-    )
+    wind = np.stack((speed * np.cos(turn), speed * np.sin(turn), _noise(rng, n, 1.0, 0.35)), axis=1)
     seen = wind + np.stack([_noise(rng, n, 1.5, 0.25) for _ in range(3)], axis=1)
     drive = Drive(start_ns=0, dt=DT, wind=wind)
     response = respond(station, drive)

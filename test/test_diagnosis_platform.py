@@ -42,9 +42,7 @@ def flown(station: Station, seed: int) -> Recording:
         rng.uniform(4.0, 8.0), 0.15, 60.0, direction=rng.uniform(-3.0, 3.0), seed=seed
     )
     trajectory = multirotor(speed=3.0, seed=seed)
-    recording = simulate(
-        station, Scenario(wind, duration=400.0, seed=seed, trajectory=trajectory)
-    )
+    recording = simulate(station, Scenario(wind, duration=400.0, seed=seed, trajectory=trajectory))
     return replace(recording, station=uav(), truth=None)
 
 

@@ -118,8 +118,24 @@ sys.exit(run(build, []))
 """
 
 
-def test_a_signal_while_a_class_is_being_made_ends_with_status_zero(tmp_path: Path) -> None:
-    process = _run(_INTERRUPTED_CLASS, tmp_path)
+_INTERRUPTED_WITHIN_COMPILED_CODE = """
+import ctypes, os, signal, sys
+from wind_sensors.nodes.execution import run
+
+def build():
+    if ctypes.pythonapi.PyRun_SimpleString(b"os.kill(os.getpid(), signal.SIGINT); 1 + 1"):
+        raise ImportError("a library failed to import")
+    raise SystemExit("the signal was lost")
+
+sys.exit(run(build, []))
+"""
+
+
+@pytest.mark.parametrize("script", [_INTERRUPTED_CLASS, _INTERRUPTED_WITHIN_COMPILED_CODE])
+def test_a_signal_that_becomes_another_error_ends_with_status_zero(
+    script: str, tmp_path: Path
+) -> None:
+    process = _run(script, tmp_path)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 0, errors
     assert "Traceback" not in errors

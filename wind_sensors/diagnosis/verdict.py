@@ -163,9 +163,7 @@ def _motion(terms: Sequence[Term]) -> list[Term]:
     return [term for term in terms if term.instrument == PLATFORM]
 
 
-def _moving(
-    comparison: Comparison, terms: Sequence[Term], other_speed: float
-) -> Comparison | None:
+def _moving(comparison: Comparison, terms: Sequence[Term], other_speed: float) -> Comparison | None:
     """The comparison with eddies measured by the wind that a wrong motion of the platform hid.
 
     Args:

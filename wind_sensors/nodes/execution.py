@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from importlib import import_module
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
 from wind_sensors.errors import UserError
@@ -52,7 +52,8 @@ class _StopSignals:
         self.phase = _Phase.LOADING
         self.stopped = False
         self._installed = False
-        self._usual = sys.unraisablehook
+        self._usual_unraisable = sys.unraisablehook
+        self._usual_printed = sys.excepthook
 
     def install(self) -> None:
         """Answer SIGINT and SIGTERM; to be called from the main thread, before rclpy.init."""
@@ -60,8 +61,11 @@ class _StopSignals:
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, self._answer)
             if sys.unraisablehook is not _unraisable:
-                self._usual = sys.unraisablehook
+                self._usual_unraisable = sys.unraisablehook
                 sys.unraisablehook = _unraisable
+            if sys.excepthook is not _printed:
+                self._usual_printed = sys.excepthook
+                sys.excepthook = _printed
             self.stopped = False
             self._installed = True
 
@@ -72,7 +76,17 @@ class _StopSignals:
         run as soon as the nodes are built then.
         """
         if not issubclass(unraisable.exc_type, _Stopped):
-            self._usual(unraisable)
+            self._usual_unraisable(unraisable)
+
+    def report_printed(
+        self, kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    ) -> None:
+        """What compiled code prints and answers with an error of its own: a stop signal, nothing.
+
+        Libraries do so when an import within them is interrupted.
+        """
+        if not issubclass(kind, _Stopped):
+            self._usual_printed(kind, error, trace)
 
     def uninstall(self, *, ignore: bool) -> None:
         """Hand SIGINT and SIGTERM back to Python's defaults, or to nobody.
@@ -103,9 +117,14 @@ def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
     _stop_signals.report_unraisable(unraisable)
 
 
+def _printed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    _stop_signals.report_printed(kind, error, trace)
+
+
 def _is_reporting(frame: FrameType | None) -> bool:
-    """Whether the hook for what nobody can catch is running, out of which nothing may be raised."""
-    while frame is not None and frame.f_code is not _unraisable.__code__:
+    """Whether a hook for what nobody can catch is running, out of which nothing may be raised."""
+    hooks = (_unraisable.__code__, _printed.__code__)
+    while frame is not None and frame.f_code not in hooks:
         frame = frame.f_back
     return frame is not None
 

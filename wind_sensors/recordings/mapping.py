@@ -193,7 +193,6 @@ class Mapping(Entry):
             found += [part for part in (parts.latitude, parts.longitude) if part is not None]
         return found
 
-
     @property
     def topics(self) -> list[str]:
         """Every topic that the mapping writes."""

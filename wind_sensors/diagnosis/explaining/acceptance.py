@@ -145,9 +145,7 @@ def passing_gain(term: Term, beside: bool = False) -> float:
     return times * (PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN)
 
 
-def brought(
-    searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float
-) -> float:
+def brought(searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float) -> float:
     """What a candidate gains over the terms before: in its own null and in likelihood, the less.
 
     In its own null alone a flexible effect gains from the noise that it has fitted away. What one

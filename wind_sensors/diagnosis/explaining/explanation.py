@@ -199,5 +199,3 @@ def judged(
         Judged(again, value, partial(searcher.whitener, again.simulated, named))
         for again, value in ranked
     ]
-
-

@@ -263,7 +263,10 @@ def _dead_times(
     return [
         replace(
             suggested(
-                "missed_pulses", rotor.name, dead_time=share * shortest, loss_probability=0.0,
+                "missed_pulses",
+                rotor.name,
+                dead_time=share * shortest,
+                loss_probability=0.0,
                 loss_growth=0.0,
             ),
             interval=holds,

@@ -92,9 +92,7 @@ def planted(station: Station, terms: Sequence[Term]) -> Station:
     return station
 
 
-def simulated_with(
-    comparison: Comparison, station: Station, terms: Sequence[Term]
-) -> Simulated:
+def simulated_with(comparison: Comparison, station: Station, terms: Sequence[Term]) -> Simulated:
     """Simulation with a part of an explanation; without any effect, if that part cannot be.
 
     A torque that grows with the rate runs away where the effect that held it back is left out.
