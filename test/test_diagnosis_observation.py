@@ -100,6 +100,21 @@ def test_pulses_stamped_in_one_lot_at_the_ends_do_not_matter() -> None:
     np.testing.assert_allclose(found[15:85], found[50], rtol=1e-5)
 
 
+@pytest.mark.parametrize("slots", [1, 2, 3])
+@pytest.mark.parametrize("bouncing", [0, 1, 2, -3, -2, -1])
+def test_a_bounce_at_the_ends_of_a_record_is_no_gust(bouncing: int, slots: int) -> None:
+    rotor = STATION.instrument("cup").model_copy(update={"pulses_per_revolution": slots})
+    assert isinstance(rotor, Cup)
+    edges = np.arange(0.06, 19.99, 0.08)
+    time = np.sort(np.append(edges, edges[bouncing] + 0.002))
+    grid = Grid(0, 0.4, 50)
+    found = rate_series(Pulses((time * 1e9).astype(np.int64)), rotor, grid)
+    steady = 2.0 * np.pi * rotor.calibration_distance / slots / 0.08
+    one_more = steady * 0.08 / grid.dt
+    assert found.max() < steady + 1.5 * one_more
+    assert found.min() > 0.8 * steady
+
+
 def test_a_rotor_that_starts_late_stood_before() -> None:
     cup = STATION.instrument("cup")
     assert isinstance(cup, Cup)

@@ -127,13 +127,32 @@ def rate_series(pulses: Pulses, rotor: Cup | Propeller, grid: Grid) -> FloatArra
 
 
 @compiled
+def _interval(time: FloatArray, slots: int, first: int) -> float:
+    """Time from one edge to the next [s]: the middle of three, each a mean over `slots` of them.
+
+    Args:
+        time: Of the edges [s], ascending, shape (m,).
+        slots: Number of intervals that are averaged.
+        first: Edge with which the first of the three begins.
+    """
+    first = max(first, 0)
+    last = min(first + 2 * slots, time.size - slots - 1)
+    one = time[first + slots] - time[first]
+    other = time[last + slots] - time[last]
+    middle = (first + last) // 2
+    between = time[middle + slots] - time[middle]
+    return (one + other + between - max(one, other, between) - min(one, other, between)) / slots
+
+
+@compiled
 def _turns_at(
     at: FloatArray, time: FloatArray, turns: FloatArray, turns_each: float, slots: int
 ) -> FloatArray:
     """Turns at given times, between the means over so many successive edges.
 
     Straight on for two edges beyond the first and the last, and to the ends of the record if those
-    are near; constant from there on.
+    are near; constant from there on. How fast, the middle of three intervals says: one of them may
+    be a bounce.
 
     Args:
         at: Ascending, shape (n,).
@@ -150,7 +169,7 @@ def _turns_at(
     turns_step = turns_each * slots if even else turns[slots] - turns[0]
     per_slot = 1.0 / slots
     x_1, y_1 = time_sum * per_slot, turns_sum * per_slot
-    x_0 = x_1 - beyond * (time[slots] - time[0]) * per_slot
+    x_0 = x_1 - beyond * _interval(time, slots, 0)
     y_0 = y_1 - beyond * turns_step * per_slot
     if at[0] < x_0 < at[0] + UNHEARD and x_0 < x_1:
         y_0 -= (x_0 - at[0]) * (y_1 - y_0) / (x_1 - x_0)
@@ -168,7 +187,7 @@ def _turns_at(
                 turns_sum += turns_step
                 x_1, y_1 = time_sum * per_slot, turns_sum * per_slot
             else:
-                time_step, turns_step = x_1 - x_0, y_1 - y_0
+                time_step, turns_step = _interval(time, slots, time.size - 3 * slots - 1), y_1 - y_0
                 x_0, y_0 = x_1, y_1
                 x_1 += beyond * time_step
                 y_1 += beyond * turns_step
