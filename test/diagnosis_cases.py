@@ -43,6 +43,23 @@ STATION = Station.model_validate(
     }
 )  # fmt: skip
 
+AEROVANE = Station.model_validate(
+    {
+        "instruments": [
+            {
+                "name": "vane", "kind": "vane", "joint_states": {"topic": "/vane/joint_states"},
+                "distance_constant": 0.6, "damping_ratio": 0.3,
+            },
+            {
+                "name": "propeller", "kind": "propeller",
+                "pulses": {"topic": "/propeller/pulses"}, "pulses_per_revolution": 6,
+                "mounted_on": "vane", "calibration_distance": 0.05, "distance_constant": 2.4,
+            },
+        ],
+        "reference": {"topic": {"topic": "/reference/wind"}, "separation": 0.5},
+    }
+)  # fmt: skip
+
 
 def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> np.ndarray:
     """Gaussian noise with a correlation time [s] and a standard deviation."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import pytest
-from diagnosis_cases import recorded
+from diagnosis_cases import AEROVANE, recorded
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
@@ -15,23 +15,6 @@ from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.report.diagnosis_page import page
 from wind_sensors.station.model import Propeller, Station
 from wind_sensors.station.signals import Recording
-
-AEROVANE = Station.model_validate(
-    {
-        "instruments": [
-            {
-                "name": "vane", "kind": "vane", "joint_states": {"topic": "/vane/joint_states"},
-                "distance_constant": 0.6, "damping_ratio": 0.3,
-            },
-            {
-                "name": "propeller", "kind": "propeller",
-                "pulses": {"topic": "/propeller/pulses"}, "pulses_per_revolution": 6,
-                "mounted_on": "vane", "calibration_distance": 0.05, "distance_constant": 2.4,
-            },
-        ],
-        "reference": {"topic": {"topic": "/reference/wind"}, "separation": 0.5},
-    }
-)  # fmt: skip
 
 LIGHT = 0.5
 """In its gusts the propeller answers within this share of the certificate's distance."""

@@ -454,6 +454,29 @@ def test_a_bearing_that_sticks_lets_go_later_than_it_stops():
         assert push == pytest.approx(4.0 * (1.0 + 2.0 * np.exp(-(turning**2))), rel=1e-3)
 
 
+def test_a_braked_propeller_stalls_at_once_and_starts_in_a_far_stronger_wind():
+    """A wind that keeps it going slowly does not start it; the torque of stalled blades by hand."""
+    braked = propeller(axis=(1.0, 0.0, 0.0), friction_speed=2.0, friction_breakaway=4.0)
+    count = 2400
+    speed = np.repeat((2.5, 3.9, 4.2, 3.9, 3.0), count)
+    wind = np.stack((speed, 0.0 * speed, 0.0 * speed), axis=1)
+    y = respond(Station(instruments=(braked,)), Drive(START, 0.05, wind)).rotors["propeller"].y
+    stopped, held, started, kept, stalled = y[count - 1 :: count]
+    # At rest the air pushes with U^2 / 4: 3.8 at 3.9 m/s, against U_s^2 = 4.
+    assert stopped == held == stalled == 0.0
+    for turning, blows in ((started, 4.2), (kept, 3.9)):
+        slip = 1.0 - turning / blows
+        gone = 1.0 / (1.0 + np.exp((0.36 - slip) / 0.05))
+        assert blows**2 * ((1.0 - gone) * slip + gone / 4.0) == pytest.approx(4.0, rel=1e-3)
+        assert turning > 0.6 * blows
+    # Blades that do not stall would turn it at 3 m/s, if slowly: (U - y) U = U_s^2.
+    smooth = respond(
+        Station(instruments=(braked.model_copy(update={"friction_breakaway": 1.0}),)),
+        Drive(START, 0.05, wind),
+    )
+    assert smooth.rotors["propeller"].y[-1] == pytest.approx(3.0 - 4.0 / 3.0, rel=1e-3)
+
+
 def test_a_change_in_the_middle_is_the_healthy_run_and_then_the_changed_one():
     drive = gusty(count=500)
     changed = Station(

@@ -188,8 +188,9 @@ class Rotor(Instrument):
     """Added to the steady reading [m/s]."""
     friction_speed: NonNegative = 0.0
     """U_s [m/s]: friction beyond the calibration's, as the speed whose torque it balances."""
-    friction_breakaway: float = Field(default=1.0, ge=1.0, le=5.0)
-    """Friction at rest relative to the turning rotor: a bearing that sticks lets go late."""
+    friction_breakaway: float = Field(default=1.0, ge=1.0, le=10.0)
+    """Friction from which a rotor starts relative to that at which it stops. A cup's bearing that
+    sticks lets go late; the blades of a braked propeller stall and drive it less at rest."""
     friction_temperature_coefficient: float = 0.0
     """c [1/K]: the friction goes with exp(c (T - T0)), as a grease's viscosity does; negative."""
     reference_temperature: float = 15.0

@@ -141,7 +141,8 @@ def _interval(time: FloatArray, slots: int, first: int) -> float:
     other = time[last + slots] - time[last]
     middle = (first + last) // 2
     between = time[middle + slots] - time[middle]
-    return (one + other + between - max(one, other, between) - min(one, other, between)) / slots
+    others = max(one, other, between) + min(one, other, between)
+    return float((one + other + between - others) / slots)
 
 
 @compiled

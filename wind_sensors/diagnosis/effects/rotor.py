@@ -89,8 +89,9 @@ BEARING_FRICTION = Effect(
     meaning="The bearing brakes the rotor with a torque that does not depend on the wind.",
     entrance="response",
     equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 exp(c (T - T0)); "
-    "steady y = U - U_s^2/U; towards rest the friction rises to `breakaway` times as much, "
-    "as exp(-(y / 1 m/s)^2)",
+    "steady y = U - U_s^2/U; towards rest a cup's friction rises to `breakaway` times as much, "
+    "as exp(-(y / 1 m/s)^2), and a propeller's torque falls to as small a part, as its blades "
+    "stall at 36 % slip",
     source="J80, eqs. (5), (6)",
     region="low speeds; the rotor stalls below U_s",
     occasional=True,
@@ -105,7 +106,7 @@ BEARING_FRICTION = Effect(
             swing=3.0,
             starts=(-0.05, -0.12),
         ),
-        Parameter("breakaway", "1", 1.0, 5.0, healthy=1.0, value_from="forms"),
+        Parameter("breakaway", "1", 1.0, 10.0, healthy=1.0, value_from="forms"),
     ),
     applies=_is_rotor,
     update=_friction,

@@ -308,7 +308,8 @@ def gained_alike(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) 
     """What an explanation gains in the kinds of comparison in which further effects act.
 
     Slots of the wrong width are seen in the intervals of pulses, with certainty; what moves the
-    mean of the same rotor has nothing to do with their form.
+    mean of the same rotor has nothing to do with their form. Of what holds and lets go, when it
+    does so is noise to an explanation with it, and may be all that it explains: judged without.
 
     Args:
         searcher: The search.
@@ -316,6 +317,8 @@ def gained_alike(searcher: Searcher, whitener: Whitener, fewer: Fit, more: Fit) 
         fewer: An explanation.
         more: One with further effects.
     """
+    if any(term.sticks for term in fewer.terms):
+        whitener = searcher.whitener(searcher.bank.without)
     nothing = whitener.of(searcher.bank.without)
     before, after = whitener.of(fewer.simulated), whitener.of(more.simulated)
     part = searcher.comparison.part_of_each

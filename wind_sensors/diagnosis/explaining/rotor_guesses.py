@@ -34,10 +34,14 @@ STIFFENINGS = (-0.03, -0.08, -0.16)
 """Squared friction speeds at the mean temperature [m^2/s^2] and coefficients [1/K] to begin with:
 the two make up for each other, so that a search for one at a time gets lost."""
 
-HOLDING_FRICTIONS = (1.2, 1.6, 2.0, 2.4)
-BREAKAWAYS = (1.5, 2.2, 3.2, 4.6)
-"""Friction speeds [m/s], and friction at rest relative to that of the turning rotor, to begin with
-where a rotor stands still in the wind: its stops and starts make the cost too rough to search."""
+STARTING_SPEEDS = (0.7, 0.8, 0.9, 1.0)
+BREAKAWAYS = (1.5, 2.2, 3.2, 4.6, 6.8)
+"""Speeds from which a rotor that stands still in the wind starts to turn, relative to `HELD` of
+those in which it stands, and friction at rest relative to that of the turning rotor, to begin with:
+stops and starts make the cost too rough to search."""
+
+HELD = 0.95
+"""Quantile."""
 
 STANDS_STILL = 0.2
 LEAST_HELD = 0.02
@@ -122,12 +126,13 @@ def _sticking(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Te
     held = (measured < STANDS_STILL) & (rate > _RATE_THAT_TURNS)
     if np.mean(held) < LEAST_HELD:
         return []
+    fast = float(np.quantile(rate[held], HELD))
     return [
         suggested(
-            "bearing_friction", rotor.name, friction_speed=speed, temperature_coefficient=0.0,
-            breakaway=breakaway,
+            "bearing_friction", rotor.name, friction_speed=share * fast / breakaway**0.5,
+            temperature_coefficient=0.0, breakaway=breakaway,
         )
-        for speed in HOLDING_FRICTIONS
+        for share in STARTING_SPEEDS
         for breakaway in BREAKAWAYS
     ]  # fmt: skip
 

@@ -56,8 +56,13 @@ class Term:
     @property
     def leaves_noise(self) -> bool:
         """Whether what it does is drawn at random or hangs on the last digit."""
+        return self.effect.noisy or self.sticks
+
+    @property
+    def sticks(self) -> bool:
+        """Whether it holds and lets go."""
         sticks = self.effect.sticks
-        return self.effect.noisy or (sticks is not None and sticks(self.values))
+        return sticks is not None and sticks(self.values)
 
     def fits(self, parameter: Parameter) -> bool:
         """Whether a fit may move one of its parameters."""

@@ -75,7 +75,9 @@ class RotorParameters(NamedTuple):
     torque_harmonic_phase: float
     """Rotor angle of the strong side [rad]."""
     breakaway: float
-    """Friction at rest relative to that of the turning rotor, 1 or more (1 = healthy)."""
+    """Friction that starts to turn the rotor relative to that which brings it to rest, 1 or more
+    (1 = healthy). A cup's bearing sticks; a propeller's blades stall, and drive it with so much
+    less torque at rest."""
 
 
 @compiled
@@ -162,7 +164,8 @@ that at rest."""
 def bearing_friction(p: RotorParameters, y: float, temperature: float) -> float:
     """Magnitude of the bearing's friction F [m^2/s^2] at a rate y = l s [m/s].
 
-    It stiffens with cold, and falls from `breakaway` times its size at rest (Stribeck's curve).
+    It stiffens with cold, and a cup's falls from `breakaway` times its size at rest (Stribeck's
+    curve).
     """
     return _at_rate(p, y, _friction_of_fast(p, temperature))
 
@@ -180,10 +183,36 @@ def _friction_of_fast(p: RotorParameters, temperature: float) -> float:
 @inlined
 def _at_rate(p: RotorParameters, y: float, friction: float) -> float:
     """Friction at a rate y [m/s], given that of a rotor that turns fast."""
-    if p.breakaway == 1.0:
+    if p.breakaway == 1.0 or _is_propeller(p):
         return friction
     slow = math.exp(-(y / STRIBECK_SPEED) * (y / STRIBECK_SPEED))
     return friction * (1.0 + (p.breakaway - 1.0) * slow)
+
+
+STALL_SLIP = 0.36
+STALL_WIDTH = 0.05
+"""Share of its free rate [1] that a propeller has lost when the flow leaves its blades, and over
+which that happens. Blades set at 45 degrees meet the wind 15 degrees steeper then."""
+
+
+@inlined
+def _is_propeller(p: RotorParameters) -> bool:
+    return p.form in (PROPELLER_JACKSON, PROPELLER_KRISTENSEN_1994)
+
+
+@inlined
+def _share_of_torque(p: RotorParameters, forcing: float, y: float) -> float:
+    """Torque of a propeller whose blades stall [1], relative to one whose blades do not.
+
+    A braked propeller slows down a little until they do, stops at once then, and starts again in a
+    far stronger wind: stalled, it is driven as at rest, `breakaway` times less than the slope of
+    the torque at full speed promises there.
+    """
+    slip = 1.0 - y / forcing if forcing != 0.0 else 0.0
+    if slip <= 0.0:
+        return 1.0
+    stalled = 1.0 / (1.0 + math.exp((STALL_SLIP - slip) / STALL_WIDTH))
+    return 1.0 + stalled * (1.0 / (p.breakaway * slip) - 1.0)
 
 
 @compiled
@@ -232,6 +261,8 @@ def _acceleration(
     if p.torque_harmonic != 0.0:
         strong = math.cos(psi - p.torque_harmonic_phase)
         torque += p.torque_harmonic * forcing * forcing * strong
+    if p.breakaway != 1.0 and _is_propeller(p):
+        torque *= _share_of_torque(p, forcing, y)
     held = _at_rate(p, y, friction)
     if y > 0.0:
         return pace * (torque - held)
