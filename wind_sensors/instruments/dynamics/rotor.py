@@ -192,7 +192,7 @@ def _at_rate(p: RotorParameters, y: float, friction: float) -> float:
 STALL_SLIP = 0.36
 STALL_WIDTH = 0.05
 """Share of its free rate [1] that a propeller has lost when the flow leaves its blades, and over
-which that happens. Blades set at 45 degrees meet the wind 15 degrees steeper then."""
+which that happens. Blades set at 45 degrees meet the wind 12 degrees steeper then."""
 
 
 @inlined
