@@ -52,19 +52,25 @@ def three_flights() -> Baseline:
     return learn([flown(uav(), seed) for seed in range(3)])
 
 
-def test_a_flight_tells_the_inflow_of_its_rotors() -> None:
-    """An inflow of 2 m/s is near what a flight of this length tells from a changed calibration."""
+def test_flights_tell_the_inflow_of_their_rotors() -> None:
+    """Each within its interval, which is wide for so short a flight, and on average to a tenth."""
     baseline = three_flights()
-    found = diagnose(flown(uav(induced_velocity=3.0, wake_skew=0.3), 50), baseline)
-    assert found.verdict == "named"
-    (finding,) = found.findings
-    assert finding.term.key == ("rotor_downwash", "platform")
-    for key, true in (("induced_velocity", 3.0), ("wake_skew", 0.3)):
-        estimate = finding.parameters[key]
-        assert estimate.value == pytest.approx(true, rel=0.2)
-        assert estimate.low < true < estimate.high
-    assert finding.proof is not None
-    assert finding.proof.excess_removed > 0.8
+    told: dict[str, list[float]] = {"induced_velocity": [], "wake_skew": []}
+    for seed in (50, 51, 52):
+        flight = flown(uav(induced_velocity=3.0, wake_skew=0.3), seed)
+        found = diagnose(flight, baseline, with_proof=seed == 50)
+        assert found.verdict == "named"
+        (finding,) = found.findings
+        assert finding.term.key == ("rotor_downwash", "platform")
+        for key, true in (("induced_velocity", 3.0), ("wake_skew", 0.3)):
+            estimate = finding.parameters[key]
+            assert estimate.low < true < estimate.high
+            told[key].append(estimate.value)
+        if seed == 50:
+            assert finding.proof is not None
+            assert finding.proof.excess_removed > 0.8
+    assert np.mean(told["induced_velocity"]) == pytest.approx(3.0, rel=0.1)
+    assert np.mean(told["wake_skew"]) == pytest.approx(0.3, rel=0.1)
 
 
 def usv() -> Station:
