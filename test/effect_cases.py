@@ -74,7 +74,6 @@ def wake(bearing: float, depth: float, width: float) -> Keys:
 
 DISTORTION = {"cosine_1": 0.06, "sine_1": 0.08, "sine_2": 0.05, "deflection": 1.0}
 
-
 def blown(case: Case, seed: int = 21) -> Recording:
     """The case simulated in a surface-layer wind that blows over it from 203 degrees."""
     wind = surface_layer_spec(8.0, 10.0, 0.01, direction=0.4, seed=seed)

@@ -247,12 +247,14 @@ def test_a_simulation_stays_on_earth(
         main(["simulate", "mast_cup_vane", "-o", str(tmp_path / "s"), f"{option}={value}"])
     assert stopped.value.code == 2
     told = " ".join(capsys.readouterr().err.split())
-    assert (
-        f"argument {option}: " in told and limit in told and f"not {value}" in told.replace("'", "")
+    assert f"argument {option}: " in told and limit in told and f"not {value}" in told.replace(
+        "'", ""
     )
 
 
-def test_a_simulation_fits_the_memory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_simulation_fits_the_memory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     long = ["simulate", "mast_cup_vane", "-o", str(tmp_path / "s"), "--duration", "100h"]
     assert main([*long, "--rate", "20"]) == 2
     told = capsys.readouterr().err

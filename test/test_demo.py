@@ -156,7 +156,9 @@ def test_estimates_that_begin_anew_are_told_from_those_that_are_lost(tmp_path: P
     found = live_agreement(_written(tmp_path / "live", _only(offline, twice)), offline, DUE)
     assert found.restarts == 1
     assert found.is_complete
-    reasons = shortfalls(Agreement(100, 0, 0, 0.5, 1, 0, 0.0, restarts=1, unheard=3, late=2), 2.0)
+    reasons = shortfalls(
+        Agreement(100, 0, 0, 0.5, 1, 0, 0.0, restarts=1, unheard=3, late=2), 2.0
+    )
     assert reasons == [
         "Live and offline differ: 3 raw messages never reached the live estimator, 2 reached it "
         "too late to be used, 1 restarts after late messages, taken for a clock that jumps back.",

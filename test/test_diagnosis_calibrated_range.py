@@ -104,7 +104,9 @@ def test_what_has_no_name_in_a_calm_is_no_mismatch(mean: float, verdict: str) ->
     # The reading runs away and back by half a turn, again and again.
     wrong = np.pi * np.sin(np.arange(angles.angle.size) * 0.02) ** 8
     wrapped = np.angle(np.exp(1j * (angles.angle + wrong)))
-    found = diagnose(replace(recording, angles={"vane": Angles(angles.time, wrapped)}), baseline())
+    found = diagnose(
+        replace(recording, angles={"vane": Angles(angles.time, wrapped)}), baseline()
+    )
     assert found.verdict == verdict
     assert not found.findings
     assert ("calibrations do not reach" in found.unexplained.description) is (mean < 2.0)

@@ -279,7 +279,9 @@ def test_what_would_miss_the_eddies_of_the_whole_record_is_not_said_to_hold_thro
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     searcher, null = searched("vane_friction", "vane", {"friction_speed": 2.0})
-    passing = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}, (150.0, None))
+    passing = Term(
+        catalogue()["vane_friction"], "vane", {"friction_speed": 2.0}, (150.0, None)
+    )
     one = fit(null, STATION, [passing], searcher.bank.without)
     null = searcher.whitener(one.simulated)
     candidate = Judged(one, evidence(one, null), lambda: null)

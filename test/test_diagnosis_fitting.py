@@ -50,7 +50,9 @@ class Valley:
 @pytest.mark.parametrize(
     ("ripple", "start", "within"), [(0.0, 6.0, 0.3), (4.0, 9.0, 14.0), (4.0, 12.0, 8.0)]
 )
-def test_hollows_in_the_cost_are_stepped_over(ripple: float, start: float, within: float) -> None:
+def test_hollows_in_the_cost_are_stepped_over(
+    ripple: float, start: float, within: float
+) -> None:
     begun = Term(TILT, "station", {"tilt_x": start, "tilt_y": 0.0}, held=frozenset({"tilt_y"}))
     found = fit(cast(Whitener, Valley(ripple)), STATION, [begun])
     assert found.terms[0].values["tilt_x"] == pytest.approx(TRUE, abs=within)

@@ -83,7 +83,9 @@ def test_a_beginning_inside_the_record_is_part_of_the_finding() -> None:
 
 def test_a_beginning_and_an_end_of_an_effect_that_depends_on_the_direction() -> None:
     effect = catalogue()["vane_eccentricity"]
-    station = with_effect(STATION, effect, "vane", {"sine": 6.0, "cosine": 3.0}, (120.0, 290.0))
+    station = with_effect(
+        STATION, effect, "vane", {"sine": 6.0, "cosine": 3.0}, (120.0, 290.0)
+    )
     found = diagnose(recorded(station, 52, swing=1.0), baseline())
     assert [f.term.key for f in found.findings] == [("vane_eccentricity", "vane")]
     begin, end = found.findings[0].term.interval

@@ -183,7 +183,9 @@ def test_a_term_on_other_signals_leaves_the_first_one_alone() -> None:
         Term(effects["extra_pulses"], "cup", bounce),
         Term(effects["vane_offset"], "vane", {"offset": 4.0}),
     ]
-    searcher = searcher_of(prepare(recorded(planted(STATION, terms), 73)), baseline(), effects, {})
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, terms), 73)), baseline(), effects, {}
+    )
     null = searcher.whitener(searcher.bank.without)
     first = fit(null, STATION, [terms[0]], searcher.bank.without)
     start = Term(effects["vane_offset"], "vane", {"offset": 2.0})
@@ -222,7 +224,9 @@ def test_an_effect_of_a_pair_is_exchanged_for_what_competed_before() -> None:
     effects = catalogue()
     late = Term(effects["timestamp_latency"], "vane", {"latency": 0.8})
     terms = [late, Term(effects["calibration_offset"], "cup", {"offset": -0.4})]
-    searcher = searcher_of(prepare(recorded(planted(STATION, terms), 74)), baseline(), effects, {})
+    searcher = searcher_of(
+        prepare(recorded(planted(STATION, terms), 74)), baseline(), effects, {}
+    )
     gain = Term(effects["calibration_drift"], "cup", {"gain": 0.95})
     null = searcher.whitener(searcher.bank.without)
     wrong = fit(null, STATION, [late, gain], searcher.bank.without)

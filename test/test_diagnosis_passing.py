@@ -45,7 +45,9 @@ def in_first_channel(comparison: Comparison, series: FloatArray, size: int) -> F
     return out
 
 
-@pytest.mark.parametrize(("begin", "end", "steady"), [(60.0, 240.0, True), (140.0, 152.0, False)])
+@pytest.mark.parametrize(
+    ("begin", "end", "steady"), [(60.0, 240.0, True), (140.0, 152.0, False)]
+)
 def test_what_passes_gains_all_the_time_that_it_holds(
     searcher: Searcher, begin: float, end: float, steady: bool
 ) -> None:
@@ -244,7 +246,9 @@ def test_a_vane_that_counts_backwards_for_a_while_is_sought_moment_by_moment() -
     """From a swing to the next a vane that counts backwards turns round elsewhere."""
     swap = Term(catalogue()["sensor_swap"], "vane", {"reversed": 1.0}, (100.0, 290.0))
     station = with_effect(STATION, swap.effect, "vane", swap.values, swap.interval)
-    searcher = searcher_of(prepare(recorded(station, 74, swing=1.6)), baseline(), catalogue(), {})
+    searcher = searcher_of(
+        prepare(recorded(station, 74, swing=1.6)), baseline(), catalogue(), {}
+    )
     null = searcher.whitener(searcher.bank.without)
     part = replace(swap, interval=(180.0, 240.0))
     found = refined_interval(searcher, null, fit(null, STATION, [part], searcher.bank.without))

@@ -157,7 +157,9 @@ def test_a_disc_is_simulated_with_the_slots_that_its_pulses_show() -> None:
 
 def test_the_beginning_of_uneven_slots_is_part_of_the_finding() -> None:
     slots = {"scatter": 0.04, "once_per_turn": 0.03}
-    station = with_effect(STATION, catalogue()["encoder_slot_error"], "cup", slots, (220.0, None))
+    station = with_effect(
+        STATION, catalogue()["encoder_slot_error"], "cup", slots, (220.0, None)
+    )
     (finding,) = diagnose(recorded(station, 81), baseline()).findings
     assert finding.term.effect.name == "encoder_slot_error"
     assert finding.term.interval[0] == pytest.approx(220.0, abs=20.0)
@@ -187,9 +189,8 @@ def test_losses_that_grow_with_the_rate_are_told_from_those_that_do_not(growth: 
     assert finding.term.effect.name == "missed_pulses"
     assert finding.term.values["loss_growth"] == pytest.approx(growth, abs=0.6)
     # The mean wind tells how many are lost; at another speed the exponent's error comes in.
-    lost = (
-        finding.term.values["loss_probability"]
-        * (7.0 / 5.0) ** (finding.term.values["loss_growth"])
+    lost = finding.term.values["loss_probability"] * (7.0 / 5.0) ** (
+        finding.term.values["loss_growth"]
     )
     assert lost == pytest.approx(0.05 * (7.0 / 5.0) ** growth, rel=0.15)
     assert finding.proof is not None and finding.proof.excess_removed > 0.8
@@ -213,7 +214,9 @@ def test_only_a_counter_cuts_intervals_off(
 
 
 def test_a_vane_that_reads_in_steps_has_no_gap_where_it_reads() -> None:
-    coarse = with_effect(STATION, catalogue()["quantisation"], "vane", {"step": 6.0, "origin": 0.0})
+    coarse = with_effect(
+        STATION, catalogue()["quantisation"], "vane", {"step": 6.0, "origin": 0.0}
+    )
     gapped = {"centre": 190.0, "width": 40.0, "reading": 0.0, "form": 0.0}
     gap = catalogue()["potentiometer_gap"]
     real = prepare(recorded(with_effect(STATION, gap, "vane", gapped), 84))

@@ -39,10 +39,14 @@ def far(recording: Recording) -> Recording:
     assert recording.reference is not None
     seen = recording.reference
     ten_seconds = np.ones(200) / 200.0
-    mean = np.stack([np.convolve(seen.velocity[:, k], ten_seconds, "same") for k in (0, 1)], axis=1)
+    mean = np.stack(
+        [np.convolve(seen.velocity[:, k], ten_seconds, "same") for k in (0, 1)], axis=1
+    )
     ahead = mean @ np.array(STANDS) / np.sum(mean * mean, axis=1)
     at = (seen.time - seen.time[0]) * 1e-9
-    shown = np.stack([np.interp(at - ahead, at, seen.velocity[:, k]) for k in range(3)], axis=1)
+    shown = np.stack(
+        [np.interp(at - ahead, at, seen.velocity[:, k]) for k in range(3)], axis=1
+    )
     reference = STATION.reference
     assert reference is not None
     station = recording.station.model_copy(
@@ -148,7 +152,9 @@ def test_a_baseline_keeps_the_place_until_the_reference_moves() -> None:
     st.integers(2, 6),
     st.integers(0, 1000),
 )
-def test_witnesses_that_agree_are_believed(truth: list[float], witnesses: int, seed: int) -> None:
+def test_witnesses_that_agree_are_believed(
+    truth: list[float], witnesses: int, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     seen = []
     for _ in range(witnesses):

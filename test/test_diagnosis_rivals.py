@@ -142,7 +142,9 @@ def test_the_same_effect_at_other_times_is_no_other_explanation(
 
 def test_a_search_without_some_effects_does_not_end_with_one_of_them() -> None:
     drifted = with_effect(STATION, catalogue()["flow_distortion"], "station", DISTORTION)
-    searcher = searcher_of(prepare(recorded(drifted, 76, swing=1.0)), baseline(), catalogue(), {})
+    searcher = searcher_of(
+        prepare(recorded(drifted, 76, swing=1.0)), baseline(), catalogue(), {}
+    )
     null = searcher.whitener(searcher.bank.without)
     terms = [
         Term(catalogue()["calibration_drift"], "cup", {"gain": 1.02}),

@@ -121,7 +121,9 @@ def test_a_fin_that_gives_way_is_no_thin_air() -> None:
     soft = with_keys(STATION, "vane", {"fin_yield_speed": 6.0})
     naming = diagnose(recorded(soft, 68, mean=6.0), baseline(), with_proof=False).naming
     thin = Term(catalogue()["air_density"], "station", {"density_ratio": 0.8})
-    suspicion = suspicion_of(replace(naming, fit=fit(naming.whitener, STATION, [thin])), STATION)
+    suspicion = suspicion_of(
+        replace(naming, fit=fit(naming.whitener, STATION, [thin])), STATION
+    )
     assert suspicion is not None
     assert suspicion.effect == "air_density"
     assert suspicion.fault.key == ("soft_fin", "vane")

@@ -230,7 +230,9 @@ def test_bouncing_contacts_are_left_out(recording: Recording) -> None:
     chance = random.Random(4)
     stream = messages(recording)
     false = [(k, n, t + 2_000_000, v) for k, n, t, v in stream if k == "pulse"]
-    bounced = sorted(stream + [m for m in false if chance.random() < 0.05], key=lambda m: m[2])
+    bounced = sorted(
+        stream + [m for m in false if chance.random() < 0.05], key=lambda m: m[2]
+    )
     _, clean = run(stream)
     estimator, found = run(bounced)
     error = np.hypot(*(found.velocity - clean.velocity)[100:, :2].T)

@@ -135,7 +135,9 @@ def test_the_inverse_vane_equation_gives_the_direction_back() -> None:
     p = vane_parameters(vane)
     x, y = -6.0 * np.cos(0.8), -6.0 * np.sin(0.8)
     acceleration = vane_acceleration(p, 1.1, 0.5, x, y, 0.2, 0.0, 0.0, 0.0, 1.02)
-    found = wind_heading_from_motion(p, 1.1, 0.5, acceleration, 6.0, 0.2, (0.0, 0.0, -9.8), 1.02)
+    found = wind_heading_from_motion(
+        p, 1.1, 0.5, acceleration, 6.0, 0.2, (0.0, 0.0, -9.8), 1.02
+    )
     assert found == pytest.approx(0.8, abs=1e-9)
 
 

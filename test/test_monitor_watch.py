@@ -74,7 +74,9 @@ def test_healthy_hours_raise_no_alarm() -> None:
     assert not watch.past
 
 
-@pytest.mark.parametrize("name", represented(PLANTED, by=("vane_friction", "missed_pulses")))
+@pytest.mark.parametrize(
+    "name", represented(PLANTED, by=("vane_friction", "missed_pulses"))
+)
 def test_an_effect_is_found_within_minutes_and_named_among_the_candidates(name: str) -> None:
     instrument, values = PLANTED[name]
     effect = catalogue()[name]

@@ -328,7 +328,9 @@ def test_a_jet_beside_its_rotor_blows_outwards_with_the_platform():
 
 @given(st.floats(1.0, 100.0), st.floats(0.05, 2.0), st.floats(0.4, 0.9), st.floats(0.05, 1.0))
 def test_thrust_and_the_power_it_takes_give_the_same_inflow(thrust, area, merit, share):
-    by_thrust = hover_induced_velocity(Downwash(thrust=thrust, disc_area=area, sensor_share=share))
+    by_thrust = hover_induced_velocity(
+        Downwash(thrust=thrust, disc_area=area, sensor_share=share)
+    )
     # Momentum through the discs: T = rho A v (2 v), and the power is T v over the merit.
     in_disc = by_thrust / share
     assert 2.0 * 1.225 * area * in_disc**2 == pytest.approx(thrust)

@@ -215,7 +215,9 @@ def test_attitude_velocity_and_mounting_enter_the_covariance_as_the_kinematics_s
         angular_rate=np.zeros((count, 3)),
         position=np.zeros((count, 3)),
     )
-    value = np.hstack((states.attitude, states.velocity, states.angular_rate, states.position))
+    value = np.hstack(
+        (states.attitude, states.velocity, states.angular_rate, states.position)
+    )
     nothing = Series(np.empty(0, dtype=np.int64), np.empty((0, 1)))
     source = CircumstanceSource(station, use_air=False)
     source.take(Block(0, 10**9, {}, {}, Series(time, value), nothing, nothing))
@@ -225,7 +227,9 @@ def test_attitude_velocity_and_mounting_enter_the_covariance_as_the_kinematics_s
     limits = TrackLimits(attitude_deviation=np.radians(1.0), velocity_deviation=0.1)
     motion = PlatformTrack(states, limits).at(time[:1]).motion
     if axes == "earth":
-        motion = replace(motion, velocity=np.einsum("nji,nj->ni", motion.to_earth, motion.velocity))
+        motion = replace(
+            motion, velocity=np.einsum("nji,nj->ni", motion.to_earth, motion.velocity)
+        )
     rotation = sensor_rotation(platform)
     in_platform = np.einsum("nji,nj->ni", motion.to_earth, wind) - motion.velocity
     expected = earth_wind_covariance(

@@ -119,7 +119,9 @@ def test_the_same_wind_is_told_in_earth_body_and_bow(graph: Graph, tf2: Any) -> 
     to_earth = north @ sensor_in_body
     wind = np.array([6.0, 0.0, 0.0])
     covariance = np.diag((0.01, 0.04, 1.0))
-    estimate = WindEstimate(10**18, wind, covariance, to_earth.T @ wind, np.eye(3), to_earth)
+    estimate = WindEstimate(
+        10**18, wind, covariance, to_earth.T @ wind, np.eye(3), to_earth
+    )
 
     seconds = itertools.count()
 

@@ -222,22 +222,7 @@ def gain_of_kernel(form: int, angle: float, wave: float, across: bool) -> comple
     friction = ROTOR.stall_speed**2 if form == PROPELLER_JACKSON else 0.0
     a4 = 1.0 if form == PROPELLER_JACKSON else 0.0
     parameters = RotorParameters(
-        form,
-        0.2,
-        0.0,
-        length,
-        a4,
-        0.0,
-        -0.3,
-        table,
-        1.0,
-        0.0,
-        friction,
-        0.0,
-        15.0,
-        1.0,
-        0.0,
-        0.0,
+        form, 0.2, 0.0, length, a4, 0.0, -0.3, table, 1.0, 0.0, friction, 0.0, 15.0, 1.0, 0.0, 0.0,
         1.0,
     )
     y, _ = integrate_rotor(

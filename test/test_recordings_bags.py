@@ -143,7 +143,9 @@ def test_refusals_say_what_to_do(tmp_path: Path, small: Path) -> None:
         read_recording(small, other)
 
 
-def test_the_bag_of_a_recording_stands_for_it(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bag_of_a_recording_stands_for_it(
+    small: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = read_recording(small)
     (file,) = (small / "bag").glob("*.mcap")
     monkeypatch.chdir(small / "bag")

@@ -49,7 +49,9 @@ DAY = 86_400_000_000_000
 def test_a_step_that_no_wind_makes_is_told_and_left_out(
     tmp_path: Path, stated: int | None, values: list[float]
 ) -> None:
-    after = counter(tmp_path, values, Input(topic="/c", type="std_msgs/msg/Int32", modulus=stated))
+    after = counter(
+        tmp_path, values, Input(topic="/c", type="std_msgs/msg/Int32", modulus=stated)
+    )
     turns = after.pulses["cup"].turns
     assert turns is not None
     assert turns.tolist() == [0.0, 1.0, 1.0, 2.0, 3.0]

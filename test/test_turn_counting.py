@@ -77,7 +77,9 @@ def test_a_contact_that_bounces_in_any_way_is_counted_once(spread: str) -> None:
     assert np.isin(np.round(time[:100], 7), np.round(true[:120], 7)).mean() > 0.97
 
 
-@pytest.mark.parametrize(("longer", "passed"), [(1.4, 1), (1.52, 1), (1.9, 2), (2.1, 2)], ids=str)
+@pytest.mark.parametrize(
+    ("longer", "passed"), [(1.4, 1), (1.52, 1), (1.9, 2), (2.1, 2)], ids=str
+)
 def test_an_edge_is_taken_for_lost_where_that_is_likelier_than_a_sudden_lull(
     longer: float, passed: int
 ) -> None:

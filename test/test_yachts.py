@@ -30,7 +30,9 @@ LOGS = Path(__file__).resolve().parents[2] / "shared" / "real" / "yacht_nmea"
         by=("Psaros33_2014-08-20",),
     ),
 )
-def test_removing_a_yachts_motion_takes_away_most_of_the_scatter(tmp_path: Path, name: str) -> None:
+def test_removing_a_yachts_motion_takes_away_most_of_the_scatter(
+    tmp_path: Path, name: str
+) -> None:
     log = LOGS / f"{name}.txt.gz"
     if not log.exists():
         pytest.skip("shared material absent")

@@ -49,7 +49,9 @@ def run(args: argparse.Namespace) -> int:
     targets = {name: folder / f"{name}.{args.format}" for name in names}
     present = [path for path in targets.values() if path.exists()]
     if present and not args.force:
-        raise UserError("the file is already there.", str(present[0]), "Use --force to replace it.")
+        raise UserError(
+            "the file is already there.", str(present[0]), "Use --force to replace it."
+        )
     console = Console()
     with refused_in_words(folder):
         folder.mkdir(parents=True, exist_ok=True)

@@ -48,7 +48,9 @@ def run(options: argparse.Namespace) -> int:
     mapping_file = load_mapping(options.mapping)
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("reading", total=len(options.files) + 1)
-        imported = import_files(options.files, mapping_file, lambda path: progress.advance(task))
+        imported = import_files(
+            options.files, mapping_file, lambda path: progress.advance(task)
+        )
         target = write_imported(options.output, imported, mapping_file, force=options.force)
         progress.advance(task)
     for topic in imported.topics:

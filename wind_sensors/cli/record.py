@@ -57,7 +57,9 @@ def run(args: argparse.Namespace) -> int:
     for topic in args.topics or ():
         fault = topic_name_fault(topic)
         if fault:
-            raise UserError(f"'{topic}' is not a ROS 2 topic name: it {fault}.", "--topics", REMEDY)
+            raise UserError(
+                f"'{topic}' is not a ROS 2 topic name: it {fault}.", "--topics", REMEDY
+            )
     keep_inputs(args.output, (args.station,))
     station = load_station(args.station) if args.station else None
     made: list[RecorderNode] = []

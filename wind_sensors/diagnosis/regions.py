@@ -125,7 +125,9 @@ def masks(comparison: Comparison) -> list[tuple[str, float, float, str, BoolArra
     everything = np.ones(comparison.grid.n, dtype=np.bool_)
     out = [("all", 0.0, comparison.grid.n * comparison.grid.dt, "everywhere", everything)]
     for part in (_time_regions, _speed_regions, _sector_regions, _heading_regions):
-        out.extend(region for region in part(comparison) if np.mean(region[4]) > _SHORTEST_SHARE)
+        out.extend(
+            region for region in part(comparison) if np.mean(region[4]) > _SHORTEST_SHARE
+        )
     return out
 
 
@@ -152,7 +154,8 @@ class RegionBank:
         """Score of every region for one white vector, or for rows of them."""
         shifts = (vector @ self.signatures.T) ** 2
         powers = [
-            np.maximum(np.sum(vector[..., a:b] ** 2, axis=-1) - (b - a), 0.0) ** 2 / (2.0 * (b - a))
+            np.maximum(np.sum(vector[..., a:b] ** 2, axis=-1) - (b - a), 0.0) ** 2
+            / (2.0 * (b - a))
             for a, b in self.bands
         ]
         single = [vector[..., k] ** 2 for k in self.statistics]

@@ -68,7 +68,9 @@ class _ArrayCore:
         self._settings = settings
         self._propellers = fixed_propellers_of(station)
         self._axes = array_axes(self._propellers)
-        self._tracks = [RotorTrack(p.name, station, origin, restored) for p in self._propellers]
+        self._tracks = [
+            RotorTrack(p.name, station, origin, restored) for p in self._propellers
+        ]
         self._source = CircumstanceSource(station, settings.use_air)
         self._keep = round(seconds * 1e9)
 

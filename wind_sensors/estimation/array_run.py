@@ -86,4 +86,6 @@ class ArrayRunCounter:
 
     def _windows(self, times: TimeArray) -> list[tuple[RunSums, npt.NDArray[np.bool_]]]:
         number = (times - self._start) // self._length
-        return [(self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)]
+        return [
+            (self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)
+        ]

@@ -187,7 +187,9 @@ def replace_clock(platform: Platform) -> Platform:
     return platform.model_copy(update={"clock": Clock()})
 
 
-def with_mount_covariance(covariance: FloatArray, wind: FloatArray, rows: FloatArray) -> FloatArray:
+def with_mount_covariance(
+    covariance: FloatArray, wind: FloatArray, rows: FloatArray
+) -> FloatArray:
     """Add what attitude, velocity and mounting contribute to the earth wind's covariance.
 
     The earth wind is R (apparent + velocity). With both vectors measured on the platform a small

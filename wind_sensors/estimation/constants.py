@@ -51,7 +51,9 @@ def axes_of(station: Station) -> tuple[NoseAxis, ...]:
 
 def fixed_propellers_of(station: Station) -> tuple[Propeller, ...]:
     """Propellers that do not turn with the wind."""
-    return tuple(i for i in station.instruments if isinstance(i, Propeller) and not i.mounted_on)
+    return tuple(
+        i for i in station.instruments if isinstance(i, Propeller) and not i.mounted_on
+    )
 
 
 def array_axes(propellers: tuple[Propeller, ...]) -> FloatArray:

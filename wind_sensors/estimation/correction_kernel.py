@@ -166,7 +166,9 @@ def correct_by_edge(
 
 
 @compiled
-def _lost_or_extra(f: FilterState, r: int, off: float, spread: float, interval: float) -> int:
+def _lost_or_extra(
+    f: FilterState, r: int, off: float, spread: float, interval: float
+) -> int:
     """Lost (positive) or extra (negative) edges of rotor r that the evidence speaks for.
 
     Args:

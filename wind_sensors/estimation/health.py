@@ -57,7 +57,9 @@ def _judged(
     return HealthLevel.OK, "Heard."
 
 
-def input_health(intake: Intake, station: Station, settings: EstimatorSettings) -> list[HealthItem]:
+def input_health(
+    intake: Intake, station: Station, settings: EstimatorSettings
+) -> list[HealthItem]:
     """One item for each input of the station.
 
     Args:

@@ -347,7 +347,9 @@ def merged(blocks: list[Block]) -> Block:
     )
 
 
-def _sorted(times: list[int], values: list[tuple[float, ...]], width: int) -> tuple[Series, int]:
+def _sorted(
+    times: list[int], values: list[tuple[float, ...]], width: int
+) -> tuple[Series, int]:
     """In order of time, doubles dropped (the smallest value stays); and how many those were."""
     t = np.array(times, dtype=np.int64)
     v = np.array(values, dtype=np.float64).reshape(len(times), width)

@@ -44,7 +44,6 @@ _ROUNDS = 12
 _FASTEST = 150.0
 """[m/s]"""
 
-
 @compiled
 def local_parabola(
     time: TimeArray, value: FloatArray, unsharp: FloatArray, at: int, width: float
@@ -207,7 +206,9 @@ def wind_heading_from_motion(
 
 
 @compiled
-def _shown(p: RotorParameters, axial: float, transverse: float) -> tuple[float, float]:
+def _shown(
+    p: RotorParameters, axial: float, transverse: float
+) -> tuple[float, float]:
     """The speed that `forcing_from_motion` tells for a wind in rotor axes, and its angle [rad]."""
     if p.form == PROPELLER_JACKSON:
         return math.hypot(axial, transverse), math.atan2(transverse, axial)
@@ -276,7 +277,9 @@ def wind_from_motion(
         wind = _along(speed, heading, rise, with_lift, c)
         at_vane = at_instrument(s, rotors + v, wind)
         h = math.hypot(at_vane[0], at_vane[1])
-        wanted = wind_heading_from_motion(q, phi, rate, nose[2], h, turn[2], pull, vane_density)
+        wanted = wind_heading_from_motion(
+            q, phi, rate, nose[2], h, turn[2], pull, vane_density
+        )
         off = wanted - math.atan2(-at_vane[1], -at_vane[0])
         off -= 2.0 * math.pi * math.floor((off + math.pi) / (2.0 * math.pi))
         if with_lift:
@@ -285,7 +288,9 @@ def wind_from_motion(
             rise = wind_heading_from_motion(
                 q, lift[0], lift[1], lift[2], h / math.cos(lift[0]), pitching, down, vane_density
             )
-        axial, transverse, _ = rotor_axes(s, i, at_instrument(s, i, wind), phi, rate + turn[2])
+        axial, transverse, _ = rotor_axes(
+            s, i, at_instrument(s, i, wind), phi, rate + turn[2]
+        )
         felt, angle = _shown(p, axial, transverse)
         told = forcing_from_motion(p, rotor[0], rotor[1], angle, density, c[AIR_TEMPERATURE])
         ratio = told / max(felt, 0.05 * speed)

@@ -31,7 +31,9 @@ def _stretches(time: TimeArray, jump_ns: int) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _inputs(estimator: StreamingEstimator, recording: Recording) -> list[tuple[TimeArray, _Feed]]:
+def _inputs(
+    estimator: StreamingEstimator, recording: Recording
+) -> list[tuple[TimeArray, _Feed]]:
     """Times of measurement of each input and what to do with its i-th message.
 
     A clock that drifts or stamps late does not delay its messages: live they would come when they
@@ -87,7 +89,9 @@ def _inputs(estimator: StreamingEstimator, recording: Recording) -> list[tuple[T
     return inputs
 
 
-def _in_order(inputs: list[tuple[TimeArray, _Feed]], jump_ns: int) -> Iterator[tuple[_Feed, int]]:
+def _in_order(
+    inputs: list[tuple[TimeArray, _Feed]], jump_ns: int
+) -> Iterator[tuple[_Feed, int]]:
     """Messages as they came: by time, and turn after turn where the clock jumps back."""
     parts = [_stretches(time, jump_ns) for time, _ in inputs]
     for turn in range(max((len(p) for p in parts), default=0)):

@@ -309,7 +309,9 @@ def _swap(
 
 
 @compiled
-def _moved(value: float, score: float, expected: float, average: float, weight: float) -> float:
+def _moved(
+    value: float, score: float, expected: float, average: float, weight: float
+) -> float:
     """A variance after one step of stochastic approximation to its maximum-likelihood value."""
     move = weight * (score - expected) / average
     return value * math.exp(min(max(move, -_LARGEST_MOVE), _LARGEST_MOVE))

@@ -29,7 +29,9 @@ class Timeline:
     def __init__(self, station: Station, origin: int) -> None:
         parts = segments(station)
         self.stations: tuple[Station, ...] = tuple(p.station for p in parts)
-        self._starts = np.array([origin + round(p.start * 1e9) for p in parts[1:]], dtype=np.int64)
+        self._starts = np.array(
+            [origin + round(p.start * 1e9) for p in parts[1:]], dtype=np.int64
+        )
 
     def number(self, time: int) -> int:
         """Index of the station that holds at a time [ns]."""

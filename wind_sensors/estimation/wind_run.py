@@ -157,4 +157,6 @@ class RunCounter:
     def _windows(self, times: TimeArray) -> list[tuple[RunSums, npt.NDArray[np.bool_]]]:
         """The sums of each window that the times fall into, and which of them do."""
         number = (times - self._start) // self._length
-        return [(self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)]
+        return [
+            (self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)
+        ]

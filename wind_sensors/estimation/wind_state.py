@@ -61,7 +61,9 @@ def wind_covariance(covariance: FloatArray, out: FloatArray) -> None:
 
 
 @compiled
-def prepare_wind_noise(f: FilterState, ring: Ring, slot: int, dt: float, noise: FloatArray) -> None:
+def prepare_wind_noise(
+    f: FilterState, ring: Ring, slot: int, dt: float, noise: FloatArray
+) -> None:
     """Decay factors and process noise of the wind states over dt.
 
     Args:

@@ -76,7 +76,9 @@ class WindowAccumulator:
         """Add a block and the estimates that became final with it; windows that are complete."""
         if self._counter is None:
             kind = ArrayRunCounter if is_array(self._station) else RunCounter
-            self._counter = kind(self._station, block.start, self._length, self._settings.use_air)
+            self._counter = kind(
+                self._station, block.start, self._length, self._settings.use_air
+            )
             self._start = block.start
             self._number = 0
         self._counter.take(block)

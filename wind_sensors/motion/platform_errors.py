@@ -58,7 +58,9 @@ def heading_without_error(deviation: HeadingDeviation, reported: npt.ArrayLike) 
 
 
 @compiled
-def _undeviated(target: FloatArray, a: float, b: float, c: float, d: float, e: float) -> FloatArray:
+def _undeviated(
+    target: FloatArray, a: float, b: float, c: float, d: float, e: float
+) -> FloatArray:
     """Headings h with h + a + b sin h + c cos h + d sin 2h + e cos 2h = target, shape (n,)."""
     out = np.empty_like(target)
     for i in range(target.size):

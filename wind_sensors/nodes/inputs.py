@@ -126,7 +126,9 @@ class EstimatorInputs:
         UserError: A message type is not installed, or has no such field.
     """
 
-    def __init__(self, station: Station, estimator: SignalTaker, now: Callable[[], int]) -> None:
+    def __init__(
+        self, station: Station, estimator: SignalTaker, now: Callable[[], int]
+    ) -> None:
         self.estimator = estimator
         self.counts: dict[str, TopicCount] = defaultdict(TopicCount)
         self._now = now

@@ -147,7 +147,9 @@ class WindPublishers:
         declination = None if platform is None else platform.magnetic_declination_deg
         # Angles count from the bow, wherever the sensor's x axis points.
         felt = (
-            estimate.apparent if platform is None else sensor_rotation(platform) @ estimate.apparent
+            estimate.apparent
+            if platform is None
+            else sensor_rotation(platform) @ estimate.apparent
         )
         for text in (
             apparent_wind_sentence(felt, talker),

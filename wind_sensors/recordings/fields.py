@@ -189,9 +189,13 @@ def columns(
     return out
 
 
-def stamps(raw: Sequence[bytes], types: Typestore, message_type: str, path: FieldPath) -> TimeArray:
+def stamps(
+    raw: Sequence[bytes], types: Typestore, message_type: str, path: FieldPath
+) -> TimeArray:
     """A `builtin_interfaces/Time` field of all the messages [ns], shape (n,); 0 where absent."""
-    seconds, nanoseconds = columns(raw, types, message_type, [(*path, "sec"), (*path, "nanosec")])
+    seconds, nanoseconds = columns(
+        raw, types, message_type, [(*path, "sec"), (*path, "nanosec")]
+    )
     present = np.isfinite(seconds) & np.isfinite(nanoseconds)
     whole = np.where(present, seconds, 0.0).astype(np.int64)
     return whole * 1_000_000_000 + np.where(present, nanoseconds, 0.0).astype(np.int64)

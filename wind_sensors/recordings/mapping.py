@@ -193,6 +193,7 @@ class Mapping(Entry):
             found += [part for part in (parts.latitude, parts.longitude) if part is not None]
         return found
 
+
     @property
     def topics(self) -> list[str]:
         """Every topic that the mapping writes."""

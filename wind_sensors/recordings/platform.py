@@ -42,7 +42,9 @@ def platform_states(
     return None
 
 
-def _from_odometry(source: Input, content: BagContent, notes: list[str]) -> PlatformStates | None:
+def _from_odometry(
+    source: Input, content: BagContent, notes: list[str]
+) -> PlatformStates | None:
     data = _topic(source, content, notes)
     if data is None:
         return None

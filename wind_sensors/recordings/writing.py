@@ -161,7 +161,9 @@ def clear_target(target: Path, *, force: bool) -> None:
         ) from None
 
 
-def _write_bag(path: Path, topics: Sequence[TopicMessages], others: OtherTopics | None) -> None:
+def _write_bag(
+    path: Path, topics: Sequence[TopicMessages], others: OtherTopics | None
+) -> None:
     types = typestore()
     filled = [topic for topic in topics if len(topic.raw)]
     time = np.concatenate([np.empty(0, dtype=np.int64), *(topic.time for topic in filled)])

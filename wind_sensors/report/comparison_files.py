@@ -46,7 +46,9 @@ def channel_summary(comparison: Comparison, simulated: Simulated) -> list[dict[s
     """
     out = []
     for channel in comparison.channels:
-        residual = comparison.measured.series[channel.name] - simulated.series[channel.name]
+        residual = (
+            comparison.measured.series[channel.name] - simulated.series[channel.name]
+        )
         unit = "m/s"
         if channel.kind == "vane_angle":
             residual, unit = np.degrees(residual / comparison.speed), "deg"

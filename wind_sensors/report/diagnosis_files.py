@@ -57,7 +57,9 @@ def make_way(
             path.unlink()
 
 
-def series_topics(comparison: Comparison, series: Mapping[str, Simulated]) -> list[TopicMessages]:
+def series_topics(
+    comparison: Comparison, series: Mapping[str, Simulated]
+) -> list[TopicMessages]:
     """Series of each channel and what is left of the measured one after each simulated one.
 
     Rotor rates in m/s of wind, vane angles in degrees, every bin at its middle.

@@ -55,7 +55,7 @@ th.n,td.n{white-space:normal}}
 VERDICTS = {
     "none": "Nothing is wrong that this recording could show",
     "named": "The missing physics has a name",
-    "ambiguous": 'The data do not tell apart what stands on either side of an "or"',
+    "ambiguous": "The data do not tell apart what stands on either side of an \"or\"",
     "unknown": "Something is wrong that no known effect explains",
     "inconclusive": "Too short or too calm to tell",
 }
@@ -247,7 +247,9 @@ def _next(diagnosis: Diagnosis) -> str:
             if not _can_have(diagnosis.station, name):
                 continue
             mark = " (close here)" if name in others else ""
-            lines.append(f"<li>against {escape(words(name))}{mark}: {escape(measurement)}</li>")
+            lines.append(
+                f"<li>against {escape(words(name))}{mark}: {escape(measurement)}</li>"
+            )
     if diagnosis.verdict == "unknown" and not diagnosis.silent:
         lines.append(
             "<li>record again when wind speed and direction differ, to see what it follows</li>"
@@ -365,7 +367,9 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         f"<section><h2>{'Before and after' if corrected else 'Recorded minus simulated'}</h2>"
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
         f"described. {'Blue: with the named physics. ' if corrected else ''}Bars are two standard "
-        "errors; grey is what healthy days show.</p>" + "".join(figures) + "</section>",
+        "errors; grey is what healthy days show.</p>"
+        + "".join(figures)
+        + "</section>",
         *(_physics(f, diagnosis.station) for f in diagnosis.findings),
         *(_proof(f) for f in diagnosis.findings[:1]),
         _next(diagnosis),

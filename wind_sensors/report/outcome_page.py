@@ -138,9 +138,7 @@ def outcome_page(outcome: Outcome) -> str:
         _effects(outcome.findings, outcome.station),
         f"<section><h2>Before and after</h2><p class='muted'>Orange: recorded minus simulated as "
         f"described; bars are two standard errors. Blue: with the named physics.</p>{figures}"
-        "</section>"
-        if figures
-        else "",
+        "</section>" if figures else "",
         _list("Seen, and not claimed", outcome.declined),
         f"<section><h2>What is left</h2><p>{escape(left)}</p></section>",
         _list("The smallest sizes that this recording would have shown", detectable),

@@ -113,7 +113,9 @@ class AngleEncoder:
             part = self._through_filter(vane, turned, response.drive.dt)
             begin = response.drive.elapsed + stretch.first * response.drive.dt
             angle = angle_at(part, response.drive.dt, since[here] - begin)
-            read = self._not_too_fast(vane, since[here], self._read(vane, angle, numbers[here]))
+            read = self._not_too_fast(
+                vane, since[here], self._read(vane, angle, numbers[here])
+            )
             out[here] = self._held_in_outages(vane, since[here], read)
             done = stop
         self._samples += stamped.shape[0]
@@ -177,7 +179,9 @@ class AngleEncoder:
             angle = np.rint(wrap(angle - origin) / step) * step + origin
         return wrap(angle)
 
-    def _not_too_fast(self, vane: Angle, since: FloatArray, readings: FloatArray) -> FloatArray:
+    def _not_too_fast(
+        self, vane: Angle, since: FloatArray, readings: FloatArray
+    ) -> FloatArray:
         """Readings as a logger passes them on that refuses to turn faster than so much."""
         fastest = np.radians(vane.slew_limit_deg_s)
         if fastest == 0.0 or readings.size == 0:

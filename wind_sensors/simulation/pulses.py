@@ -308,7 +308,9 @@ class PulseCircuit:
             rotor = passed.rotor
             electronics = rotor.electronics
             sure = {"bounce_probability": 0.0, "loss_probability": 0.0}
-            certain = rotor.model_copy(update={"electronics": electronics.model_copy(update=sure)})
+            certain = rotor.model_copy(
+                update={"electronics": electronics.model_copy(update=sure)}
+            )
             part = self._recorded(replace(passed, rotor=certain))
             longest = LONGEST_BOUNCE * electronics.bounce_delay
             heard = max(1.0 - electronics.dead_time / longest, 0.0)
@@ -318,7 +320,9 @@ class PulseCircuit:
                 # Those that a dead time or an outage takes leave fewer edges than passed.
                 lost = np.interp(part, stamps(rotor.clock, passed.times, self._origin), lost)
             time.append(part)
-            weights.append(np.full(part.size, (1.0 - lost + bounced) / rotor.pulses_per_revolution))
+            weights.append(
+                np.full(part.size, (1.0 - lost + bounced) / rotor.pulses_per_revolution)
+            )
         return Pulses(np.concatenate(time), np.cumsum(np.concatenate(weights)))
 
     def _silent(self, rotor: Rotor, times: TimeArray) -> npt.NDArray[np.bool_]:

@@ -165,7 +165,9 @@ class SignalStream:
         return SignalBlock(
             start=drive.start_ns,
             stop=self._at(end),
-            pulses={n: c.signals(passed_slots(response, n)) for n, c in self._circuits.items()},
+            pulses={
+                n: c.signals(passed_slots(response, n)) for n, c in self._circuits.items()
+            },
             angles={n: self._angles(n, response, begin, end) for n in self._encoders},
             reference=reference,
             platform=None if motion is None else self._platform(response, motion, begin, end),

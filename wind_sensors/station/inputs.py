@@ -17,7 +17,9 @@ from wind_sensors.errors import UserError
 from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Vane
 from wind_sensors.station.signals import FloatArray, TimeArray
 
-Signal = Literal["pulses", "angle", "wind", "temperature", "pressure", "odometry", "imu", "twist"]
+Signal = Literal[
+    "pulses", "angle", "wind", "temperature", "pressure", "odometry", "imu", "twist"
+]
 FieldPath = tuple[str | int, ...]
 Meaning = Literal["", "edge", "edges", "count", "angle", "frequency", "value"]
 

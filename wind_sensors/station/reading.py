@@ -102,7 +102,9 @@ def _with_profiles(
             close = get_close_matches(name, profiles, n=1, cutoff=0.4)
             known = f"Profiles: {', '.join(sorted(profiles)) or 'none found'}."
             remedy = f"Did you mean '{close[0]}'?" if close else known
-            problems.append(Problem(document.where(path), path, f"there is no '{name}'.", remedy))
+            problems.append(
+                Problem(document.where(path), path, f"there is no '{name}'.", remedy)
+            )
             filled.append(entry)
             continue
         kind = entry.get("kind", profile.kind)

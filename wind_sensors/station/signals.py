@@ -130,8 +130,8 @@ def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:
     after = at[np.minimum(following, at.size - 1)] - time
     before, after = np.abs(before), np.abs(after)
     close = np.minimum(before, after) <= _ERRATIC_REACH
-    between = (
-        (following > 0) & (following < at.size) & (np.maximum(before, after) <= _ERRATIC_PAUSE)
+    between = (following > 0) & (following < at.size) & (
+        np.maximum(before, after) <= _ERRATIC_PAUSE
     )
     return np.asarray(close | between, dtype=np.bool_)
 

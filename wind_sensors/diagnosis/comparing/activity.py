@@ -74,7 +74,9 @@ def sampling_variance(channel: Channel, mean_speed: float, grid: Grid) -> FloatA
     return np.where(count < FEWEST, np.inf, 4.0 / np.maximum(count, 1.0))
 
 
-def levels(series: FloatArray, channel: Channel, mean_speed: float, grid: Grid) -> FloatArray:
+def levels(
+    series: FloatArray, channel: Channel, mean_speed: float, grid: Grid
+) -> FloatArray:
     """Logarithm of the power in each band of each segment.
 
     Args:

@@ -276,7 +276,9 @@ class Comparison(View):
         others = tuple(c for c in believed.changes if c.instrument != PLATFORM)
         changes = (*others, *(c for c in station.changes if c.instrument == PLATFORM))
         moved = {"platform": station.platform, "changes": changes}
-        series, cosine = self._by_motion(believed.model_copy(update=moved), instrument, self.moving)
+        series, cosine = self._by_motion(
+            believed.model_copy(update=moved), instrument, self.moving
+        )
         (name,) = seen.series
         return replace(seen, by_motion={name: series}, by_motion_cosine={name: cosine})
 
@@ -292,7 +294,9 @@ class Comparison(View):
             rotor = channel.kind == "rotor_rate"
             return self.course_of(channel, pulses[instrument] if rotor else angles[instrument])
 
-        return self._in_slow_wind.of((instrument, station.platform, repr(station.changes)), course)
+        return self._in_slow_wind.of(
+            (instrument, station.platform, repr(station.changes)), course
+        )
 
     def _simulated_alone(self, station: Station, instrument: str) -> Simulated:
         """Series and statistics of one instrument."""

@@ -233,7 +233,9 @@ class View:
         series, cosine = drawn, self._cosine(drawn)
         statistics = (
             self._log_spectrum(cosine, self.grid.dt, channel, HIGHEST_OF_RATES),
-            interval_statistics(pulses, rotor, self.wind_from, self.speed, self.grid, self.mask),
+            interval_statistics(
+                pulses, rotor, self.wind_from, self.speed, self.grid, self.mask
+            ),
             change_statistics(drawn, self._windy_changes),
         )
         if on_average is None:
@@ -365,7 +367,9 @@ class View:
 
 
 @compiled
-def _drawn(time: FloatArray, turns: FloatArray, slots: int, weight: FloatArray, dt: float) -> float:
+def _drawn(
+    time: FloatArray, turns: FloatArray, slots: int, weight: FloatArray, dt: float
+) -> float:
     """Sum of the variances of how often each edge is counted, where bins count.
 
     Args:

@@ -210,5 +210,6 @@ def _beside_expected(comparison: Comparison) -> dict[str, FloatArray]:
     """Measured minus simulated angle of each vane [rad], by channel name."""
     seen = comparison.observe({}, comparison.recording.angles).series
     return {
-        name: series / comparison.speed - comparison.expected[name] for name, series in seen.items()
+        name: series / comparison.speed - comparison.expected[name]
+        for name, series in seen.items()
     }

@@ -108,7 +108,9 @@ def band_means(values: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
 
 def band_medians(values: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
     """Median of `values` within each band."""
-    return np.array([np.median(values[a:b]) for a, b in itertools.pairwise(edges)])
+    return np.array(
+        [np.median(values[a:b]) for a, b in itertools.pairwise(edges)]
+    )
 
 
 def robust_band_variances(squares: FloatArray, edges: npt.NDArray[np.intp]) -> FloatArray:
@@ -175,7 +177,9 @@ def coherence_of(measured: FloatArray, simulated: FloatArray, dt: float, n: int)
     count = np.diff(edges)
     raw = c * c / np.maximum(m * s, 1e-300)
     squared = np.clip((raw - 1.0 / count) / (1.0 - 1.0 / count), 0.0, 1.0)
-    frequency = np.asarray(0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * n * dt), dtype=np.float64)
+    frequency = np.asarray(
+        0.5 * (edges[:-1] + edges[1:] - 1) / (2.0 * n * dt), dtype=np.float64
+    )
     return Coherence(edges, frequency, m, s, c, squared)
 
 

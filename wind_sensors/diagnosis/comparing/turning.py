@@ -77,7 +77,9 @@ def slow_departure(difference: FloatArray, speed: FloatArray, grid: Grid) -> Flo
     if not _stays_away(*_turning(difference, grid), speed, grid):
         return np.zeros(grid.n)
     width = round(DEPARTURE_TIME / grid.dt)
-    east, north = (uniform_filter1d(f(difference), width, mode="nearest") for f in (np.cos, np.sin))
+    east, north = (
+        uniform_filter1d(f(difference), width, mode="nearest") for f in (np.cos, np.sin)
+    )
     return np.asarray(np.unwrap(np.arctan2(north, east)), dtype=np.float64)
 
 

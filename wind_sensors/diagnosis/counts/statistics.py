@@ -101,6 +101,8 @@ def counts_of(recording: Recording, rotor: str) -> tuple[FloatArray, IntArray]:
     return np.diff(pulses.time) * 1e-9, np.rint(exact).astype(np.int64)
 
 
+
+
 def count_statistics(recording: Recording, rotor: str) -> CountStatistics:
     """Statistics of a rotor's counts.
 
@@ -193,4 +195,6 @@ def compare_pair(
         name: float(np.sum((difference - (g @ difference) / (g @ g) * g) ** 2))
         for name, g in shapes.items()
     }
-    return PairCounts(int(one.size), middle, float(errors[0]), slope, float(errors[1]), misfit)
+    return PairCounts(
+        int(one.size), middle, float(errors[0]), slope, float(errors[1]), misfit
+    )

@@ -75,7 +75,9 @@ MISSED_PULSES = Effect(
             "beat of the pulses with the wind, twice per turn",
         }
     ),
-    templates=({"dead_time": 0.0, "loss_probability": 0.01, "loss_growth": 0.0},),
+    templates=(
+        {"dead_time": 0.0, "loss_probability": 0.01, "loss_growth": 0.0},
+    ),
     confusable={
         "calibration_drift": "pulse intervals: lost pulses double some of them",
         "encoder_slot_error": "pulse intervals against rotor angle",
@@ -126,7 +128,8 @@ def _in_and_besides(displacements: Sequence[float]) -> tuple[complex, list[compl
     middle = sum(displacements) / n
     swing = 2.0 * sum((d - middle) * w for d, w in zip(displacements, waves, strict=True)) / n
     besides = [
-        d - middle - (swing * w.conjugate()).real for d, w in zip(displacements, waves, strict=True)
+        d - middle - (swing * w.conjugate()).real
+        for d, w in zip(displacements, waves, strict=True)
     ]
     return swing, waves, besides
 
@@ -286,12 +289,7 @@ CLOCK_DRIFT = Effect(
     smooths=True,
     parameters=(
         Parameter(
-            "drift",
-            "ppm",
-            -20000.0,
-            20000.0,
-            minimum=300.0,
-            step=50.0,
+            "drift", "ppm", -20000.0, 20000.0, minimum=300.0, step=50.0,
             starts=(1000.0, -1000.0, 3000.0, -3000.0),
         ),
     ),

@@ -132,23 +132,11 @@ PLATFORM_VELOCITY = Effect(
     contains=frozenset({"platform_velocity_scale"}),
     parameters=(
         Parameter(
-            "velocity_share",
-            "1",
-            -1.2,
-            1.0,
-            healthy=1.0,
-            minimum=MISSING_SHARE,
-            starts=(0.0, 0.5),
-            step=0.02,
+            "velocity_share", "1", -1.2, 1.0, healthy=1.0, minimum=MISSING_SHARE,
+            starts=(0.0, 0.5), step=0.02,
         ),
         Parameter(
-            "position_share",
-            "1",
-            0.0,
-            1.0,
-            healthy=0.0,
-            starts=(1.0,),
-            step=0.02,
+            "position_share", "1", 0.0, 1.0, healthy=0.0, starts=(1.0,), step=0.02,
             free=log_is_dead,
         ),
     ),
@@ -178,13 +166,7 @@ PLATFORM_VELOCITY_SCALE = Effect(
     parameters=(
         # Knots or km/h for m/s, or the other way round, are errors of 0.28 to 3.6.
         Parameter(
-            "velocity_scale",
-            "1",
-            0.1,
-            6.0,
-            healthy=1.0,
-            minimum=0.05,
-            step=0.01,
+            "velocity_scale", "1", 0.1, 6.0, healthy=1.0, minimum=0.05, step=0.01,
             starts=(0.4, 0.7, 1.5, 2.5),
         ),
     ),
@@ -218,13 +200,7 @@ LEVER_ARM = Effect(
     region="while the carrier rolls, pitches or turns",
     parameters=tuple(
         Parameter(
-            name,
-            "m",
-            -30.0,
-            30.0,
-            minimum=0.5,
-            step=0.1,
-            starts=(-5.0, -2.0, 2.0, 5.0),
+            name, "m", -30.0, 30.0, minimum=0.5, step=0.1, starts=(-5.0, -2.0, 2.0, 5.0),
             spare=True,
         )
         for name in ("dx", "dy", "dz")
@@ -284,7 +260,9 @@ HEADING_DEVIATION = Effect(
         Parameter("sine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
         Parameter("cosine", "deg", -45.0, 45.0, minimum=2.0, step=0.5),
         *(
-            Parameter(name, "deg", -15.0, 15.0, minimum=2.0, step=0.5, spare=True, free=_goes_round)
+            Parameter(
+                name, "deg", -15.0, 15.0, minimum=2.0, step=0.5, spare=True, free=_goes_round
+            )
             for name in ("sine_2", "cosine_2")
         ),
     ),
@@ -328,14 +306,8 @@ FRAME_ERROR = Effect(
         Parameter("roll", "deg", -90.0, 90.0, minimum=6.0, step=0.5, spare=True),
         Parameter("pitch", "deg", -90.0, 90.0, minimum=6.0, step=0.5, spare=True),
         Parameter(
-            "velocity_turn",
-            "deg",
-            -270.0,
-            270.0,
-            minimum=6.0,
-            step=1.0,
-            starts=(20.0, -20.0, 90.0, -90.0, 180.0),
-            spare=True,
+            "velocity_turn", "deg", -270.0, 270.0, minimum=6.0, step=1.0,
+            starts=(20.0, -20.0, 90.0, -90.0, 180.0), spare=True,
         ),
     ),
     applies=_is_platform,
@@ -375,7 +347,8 @@ ROTOR_DOWNWASH = Effect(
     name="rotor_downwash",
     meaning="The inflow of the carrier's own rotors reaches the sensor.",
     entrance="wind",
-    equation="w' = w - v_i; u' = u + v_i (skew u / |v_h| + spread); v_i sqrt(u^2 + v_i^2) = v_h^2",
+    equation="w' = w - v_i; u' = u + v_i (skew u / |v_h| + spread); "
+    "v_i sqrt(u^2 + v_i^2) = v_h^2",
     source="Glauert's momentum theory of a rotor in forward flight",
     region="strongest at low airspeed",
     occasional=True,

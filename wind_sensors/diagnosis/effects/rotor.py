@@ -96,14 +96,11 @@ BEARING_FRICTION = Effect(
     region="low speeds; the rotor stalls below U_s",
     occasional=True,
     parameters=(
-        Parameter("friction_speed", "m/s", 0.0, 6.0, minimum=0.3, step=0.1, starts=(0.5, 1.0, 2.0)),
         Parameter(
-            "temperature_coefficient",
-            "1/K",
-            -0.4,
-            0.05,
-            step=0.005,
-            swing=3.0,
+            "friction_speed", "m/s", 0.0, 6.0, minimum=0.3, step=0.1, starts=(0.5, 1.0, 2.0)
+        ),
+        Parameter(
+            "temperature_coefficient", "1/K", -0.4, 0.05, step=0.005, swing=3.0,
             starts=(-0.05, -0.12),
         ),
         Parameter("breakaway", "1", 1.0, 10.0, healthy=1.0, value_from="forms"),
@@ -136,13 +133,7 @@ AIR_DENSITY = Effect(
     smooths=True,
     parameters=(
         Parameter(
-            "density_ratio",
-            "1",
-            0.2,
-            2.5,
-            healthy=1.0,
-            minimum=0.1,
-            step=0.04,
+            "density_ratio", "1", 0.2, 2.5, healthy=1.0, minimum=0.1, step=0.04,
             starts=(0.4, 0.6, 0.8, 1.25, 1.6),
         ),
     ),
@@ -173,13 +164,7 @@ ROTOR_INERTIA = Effect(
     smooths=True,
     parameters=(
         Parameter(
-            "inertia_factor",
-            "1",
-            0.2,
-            12.0,
-            healthy=1.0,
-            minimum=0.3,
-            step=0.1,
+            "inertia_factor", "1", 0.2, 12.0, healthy=1.0, minimum=0.3, step=0.1,
             starts=(1.5, 3.0, 6.0),
         ),
     ),
@@ -302,13 +287,7 @@ ICING = Effect(
     parameters=(
         Parameter("gain", "1", 0.2, 1.0, healthy=1.0, minimum=0.03, step=0.005, starts=(0.9,)),
         Parameter(
-            "inertia_factor",
-            "1",
-            1.0,
-            12.0,
-            healthy=1.0,
-            minimum=0.4,
-            step=0.1,
+            "inertia_factor", "1", 1.0, 12.0, healthy=1.0, minimum=0.4, step=0.1,
             starts=(1.5, 3.0),
         ),
         Parameter("growth_time", "s", 0.0, 600.0, step=10.0, starts=(100.0,), spare=True),

@@ -84,7 +84,8 @@ class Beside:
         fits = self.searcher.fit_each(self.whitener, self.current, new)
         self._fitted += zip(new, fits, strict=True)
         chosen = [
-            next(fit for starts, fit in self._fitted if starts == wanted) for wanted in candidates
+            next(fit for starts, fit in self._fitted if starts == wanted)
+            for wanted in candidates
         ]
         return self.searcher.possible(chosen)
 
@@ -101,12 +102,16 @@ class Beside:
             used = {t.key for t in current.terms}
             scores = searcher.scores(whitener, current.vector)
             if all(
-                s.gain < WORTH_ANOTHER_TURN for s in scores if (s.effect, s.instrument) not in used
+                s.gain < WORTH_ANOTHER_TURN
+                for s in scores
+                if (s.effect, s.instrument) not in used
             ):
                 return []
         candidates = [
             starts
-            for starts in searcher.single_candidates(whitener, current.vector, LATER_CANDIDATES)
+            for starts in searcher.single_candidates(
+                whitener, current.vector, LATER_CANDIDATES
+            )
             if eligible(starts) and not is_a_stall(searcher, current, starts[0])
         ]
         known = {starts[0].key: starts for starts in candidates}
@@ -143,7 +148,9 @@ def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -
     ]
     own = in_parallel(lambda f: in_own_noise(searcher, f), apart, searcher.workers)
     promising = [
-        (cost, f) for cost, f in zip(own, apart, strict=True) if so_far - cost > WORTH_ANOTHER_TURN
+        (cost, f)
+        for cost, f in zip(own, apart, strict=True)
+        if so_far - cost > WORTH_ANOTHER_TURN
     ]
     return [f for _, f in sorted(promising, key=lambda pair: pair[0])[:LARGE_CANDIDATES]]
 

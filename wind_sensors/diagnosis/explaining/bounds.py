@@ -18,7 +18,9 @@ at its lower one before: a share of all that it may grow by is much of what it m
 
 def run_away(term: Term) -> frozenset[str]:
     """Names of the parameters that ended at a bound, where they cannot be."""
-    return frozenset(p.name for p in term.effect.parameters if _is_at_bound(p, term.values[p.name]))
+    return frozenset(
+        p.name for p in term.effect.parameters if _is_at_bound(p, term.values[p.name])
+    )
 
 
 def _is_at_bound(parameter: Parameter, value: float) -> bool:
@@ -91,7 +93,9 @@ def without_spare(found: Fit, price: float) -> tuple[Term, ...]:
     )
 
 
-def _with_idle_held(found: Fit, number: int, may_rest: frozenset[str], price: float) -> Term | None:
+def _with_idle_held(
+    found: Fit, number: int, may_rest: frozenset[str], price: float
+) -> Term | None:
     """One term with some parameters held that do not pay for themselves; None: all do.
 
     Args:

@@ -199,3 +199,5 @@ def judged(
         Judged(again, value, partial(searcher.whitener, again.simulated, named))
         for again, value in ranked
     ]
+
+

@@ -215,7 +215,9 @@ class Problem:
     def _change(self, base: FloatArray, moved: Simulated) -> FloatArray:
         return np.asarray(np.nan_to_num(self.compared(moved) - base))
 
-    def _slight_change(self, base: FloatArray, moved: Simulated, of_platform: bool) -> FloatArray:
+    def _slight_change(
+        self, base: FloatArray, moved: Simulated, of_platform: bool
+    ) -> FloatArray:
         """How far what is compared moves by a slight change, shape (l,).
 
         The eddies stay what they are: what a slight change of the platform does, its motion does.
@@ -277,9 +279,8 @@ def fit(
     values = np.clip(values_of(terms), low, high)
     cost, vector, first = problem.trial(values)
     if first is None:
-        values = np.array(
-            [p.healthy if p.healthy is not None else 0.5 * (p.low + p.high) for p in parameters]
-        )
+        values = np.array([p.healthy if p.healthy is not None else 0.5 * (p.low + p.high)
+                           for p in parameters])
         vector, first = problem.vector(values)
         cost = float(vector @ vector)
     simulated = first
@@ -344,7 +345,9 @@ def fit(
     covariance = _covariance(normal, parameters)
     fitted = _with_values(terms, values)
     active = int(np.count_nonzero(seen))
-    return Fit(fitted, cost, vector, simulated, covariance, problem.evaluations, active, slopes)
+    return Fit(
+        fitted, cost, vector, simulated, covariance, problem.evaluations, active, slopes
+    )
 
 
 def _covariance(normal: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
@@ -401,7 +404,9 @@ def covariance_of(whitener: Whitener, station: Station, explanation: Fit) -> Flo
         back = -1.0 if departure > 0.0 else 1.0
         steps.append(back * max(float(size), parameter.difference))
     base = problem.compared(problem.simulate(values))
-    jacobian = problem.whitened(problem.slopes(values, base, low, high, steps=np.array(steps)))
+    jacobian = problem.whitened(
+        problem.slopes(values, base, low, high, steps=np.array(steps))
+    )
     return _covariance(jacobian.T @ jacobian, parameters)
 
 

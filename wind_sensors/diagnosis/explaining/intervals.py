@@ -105,7 +105,9 @@ def cell_signatures(
         name = channel.name
         risen = planted.levels[name] - without.levels[name]
         each = activity.contrasts(there[:, None, :] * risen, planted.counted)
-        parts.append((each / trust[name].activity_deviation[:, None]).reshape(cells, -1))
+        parts.append(
+            (each / trust[name].activity_deviation[:, None]).reshape(cells, -1)
+        )
     return np.concatenate(parts, axis=1)
 
 

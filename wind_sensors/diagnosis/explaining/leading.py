@@ -99,7 +99,9 @@ def leader_of(
     enough = [
         pair
         for pair in enough
-        if not _holds_always_as_well(pair[1], enough, _as_well(current, so_far - pair[1].evidence))
+        if not _holds_always_as_well(
+            pair[1], enough, _as_well(current, so_far - pair[1].evidence)
+        )
     ]
     enough = explaining_what_stands_out(searcher, whitener, current, enough)
     most = max(brings for brings, _ in enough)
@@ -223,7 +225,9 @@ def _as_well(current: Fit | None, gain: float) -> float:
     return max(least, ONSET_SHARE * gain)
 
 
-def _holds_always_as_well(one: Judged, others: Sequence[tuple[float, Judged]], near: float) -> bool:
+def _holds_always_as_well(
+    one: Judged, others: Sequence[tuple[float, Judged]], near: float
+) -> bool:
     """Whether an effect that passes would explain nearly as much if it always held."""
     newest = one.fit.terms[-1]
     if newest.interval == ALWAYS or newest.effect.legible:

@@ -72,7 +72,9 @@ def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """
     for _ in range(MOST_LOOKS):
         around = _around(current.terms)
-        costs = in_parallel(partial(cost_of, whitener, searcher.station), around, searcher.workers)
+        costs = in_parallel(
+            partial(cost_of, whitener, searcher.station), around, searcher.workers
+        )
         cost, terms = min(
             zip(costs, around, strict=True), key=itemgetter(0), default=(current.cost, ())
         )
@@ -172,7 +174,9 @@ def spared(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     return fewer if total(fewer) < total(current) else current
 
 
-def _only_mends(searcher: Searcher, whitener: Whitener, current: Fit) -> frozenset[tuple[str, str]]:
+def _only_mends(
+    searcher: Searcher, whitener: Whitener, current: Fit
+) -> frozenset[tuple[str, str]]:
     """Terms that may only make good the form of larger ones, and bring less than these.
 
     A carrier's motion left in altogether has no more than two of its smallest sizes; what brings
@@ -215,9 +219,8 @@ def _simpler(
             continue
         for contained in sorted(term.effect.contains & searcher.effects.keys()):
             effect = searcher.effects[contained]
-            values = {
-                p.name: term.values[p.name] for p in effect.parameters if p.name in term.values
-            }
+            values = {p.name: term.values[p.name] for p in effect.parameters
+                      if p.name in term.values}
             if len(values) == len(effect.parameters):
                 out.append([*sound, replace(term, effect=effect, values=values)])
     return out
@@ -319,7 +322,9 @@ def swapped(
             for starts in _in_place_of(searcher, whitener, without, replaced, known)
             if may_join(starts[0], others) and starts[0].effect.name not in excluded
         ]
-        rivals = [f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)]
+        rivals = [
+            f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)
+        ]
         nearest = sorted(rivals, key=total)[:SWAP_FINALISTS]
         ranked = [r for r in judged(searcher, nearest) if plausible(r.fit)]
         losers.extend(ranked)
@@ -341,7 +346,9 @@ def swapped(
             if len(waiting) < most:
                 # What the new one is mistaken for has not been tried.
                 waiting.append(current.terms[-1].key)
-    behind = [Alternative(r.fit, _behind(whitener, r, leader)) for r in losers if r is not leader]
+    behind = [
+        Alternative(r.fit, _behind(whitener, r, leader)) for r in losers if r is not leader
+    ]
     return current, tuple(sorted(behind, key=lambda a: a.behind))
 
 

@@ -88,8 +88,9 @@ def name(
     narrow = _greedy(searcher, progress, replace(first, led=led), everywhere, beside)
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
-    simpler = 0 < narrow.fit.active < found.fit.active and len(narrow.fit.terms) <= len(
-        found.fit.terms
+    simpler = (
+        0 < narrow.fit.active < found.fit.active
+        and len(narrow.fit.terms) <= len(found.fit.terms)
     )
     if not simpler:
         return found
@@ -201,7 +202,9 @@ def _with_another(
     current = fit(whitener, searcher.station, current.terms, searcher.bank.without)
     if second is None:
         return current, losers
-    newest = [a.fit.terms[-1] for a in (*second[1][:KNOWN_CANDIDATES], *losers[:KNOWN_CANDIDATES])]
+    newest = [
+        a.fit.terms[-1] for a in (*second[1][:KNOWN_CANDIDATES], *losers[:KNOWN_CANDIDATES])
+    ]
     pair = pruned(searcher, whitener, current)
     current = merged(
         searcher, whitener, pair, [first.terms, *((term,) for term in newest)], excluded
@@ -265,7 +268,9 @@ def _settled(
     adequate = whitener
     if current.terms:
         adequate = searcher.whitener(current.simulated, current)
-        current = replace(current, covariance=covariance_of(adequate, searcher.station, current))
+        current = replace(
+            current, covariance=covariance_of(adequate, searcher.station, current)
+        )
     return Naming(
         current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
         alternatives, screened,

@@ -147,14 +147,18 @@ def window_starts(
         joint = len(members) <= JOINT_TEMPLATES
         span = _best_span(interval_gains(cuts, cells, vector, joint), SHORTEST_WINDOW)
         advantage = SMOOTHING_WINDOW_ADVANTAGE if effect.smooths else WINDOW_ADVANTAGE
-        if span is None or span.gain < max(always.get(key, 0.0) + advantage, LEAST_WINDOW_GAIN):
+        if span is None or span.gain < max(
+            always.get(key, 0.0) + advantage, LEAST_WINDOW_GAIN
+        ):
             return None
         amplitudes = {
             bank.templates[k].number: multiple * float(a)
             for k, a in zip(members, span.amplitudes, strict=True) if a != 0.0
         }  # fmt: skip
         template = bank.templates[members[int(np.argmax(np.abs(span.amplitudes)))]]
-        score = Score(*key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0))
+        score = Score(
+            *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)
+        )
         interval = interval_of(searcher.comparison, *span.window)
         starts = [Term(effect, key[1], starting_values(score, searcher.comparison.drive), interval)]
         starts += [replace(g, interval=interval) for g in searcher.guesses.get(key, ())]
@@ -202,7 +206,9 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
             always = comparison.possible(planted(searcher.station, [*fixed, endless]))
         if always is None:
             break
-        window = _best_window(searcher, whitener, (without, always), best.terms[-1].interval, step)
+        window = _best_window(
+            searcher, whitener, (without, always), best.terms[-1].interval, step
+        )
         if window is None:
             break
         interval = interval_of(searcher.comparison, *window)
@@ -286,7 +292,9 @@ def _by_trial(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
             tried = [(place, end) if begins else (begin, place) for place in places.tolist()]
             begin, end = tried[int(np.argmin(in_parallel(cost, tried, searcher.workers)))]
     moved = replace(last, interval=interval_of(comparison, begin, end))
-    trial = fit(whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2)
+    trial = fit(
+        whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2
+    )
     return trial if total(trial) < total(candidate) else candidate
 
 
@@ -388,7 +396,9 @@ def with_interval(searcher: Searcher, current: Fit) -> Fit:
     waiting = [term.key for term in current.terms]
     while waiting:
         terms = [next(t for t in current.terms if t.key == key) for key in waiting]
-        passing = in_parallel(partial(_passing, searcher, current), terms, searcher.workers)
+        passing = in_parallel(
+            partial(_passing, searcher, current), terms, searcher.workers
+        )
         # What one leaves may be the others' interval: they are asked again beside it.
         first = next((k for k, found in enumerate(passing) if found is not None), None)
         if first is None:

@@ -178,7 +178,9 @@ def promising_pairs(
     return [terms for _, terms in sorted(found, key=lambda pair: -pair[0])]
 
 
-def promise(gram: FloatArray, seen: FloatArray, members: list[int]) -> tuple[float, FloatArray]:
+def promise(
+    gram: FloatArray, seen: FloatArray, members: list[int]
+) -> tuple[float, FloatArray]:
     """Drop of the cost by the best multiples of some changes, and those multiples.
 
     Args:

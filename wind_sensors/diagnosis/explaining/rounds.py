@@ -281,7 +281,9 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
     known = {term.key for term in newest if term.interval == last.interval}
     seen = [t.effect for t in newest if t.key in known and t.instrument == last.instrument]
     starts = {
-        key: list(guesses) for key, guesses in searcher.guesses.items() if key[0] in BLIND_IN_PARTS
+        key: list(guesses)
+        for key, guesses in searcher.guesses.items()
+        if key[0] in BLIND_IN_PARTS
     }
     possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
     for effect in searcher.effects.values():
@@ -347,9 +349,8 @@ def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
             key = (effect.name, last.instrument)
             if last.effect.name not in effect.contains or key not in possible or key in found:
                 continue
-            shared = {
-                p.name: last.values[p.name] for p in effect.parameters if p.name in last.values
-            }
+            shared = {p.name: last.values[p.name] for p in effect.parameters
+                      if p.name in last.values}
             values = {**effect.templates[0], **shared}
             found[key] = [*others, replace(last, effect=effect, values=values)]
     return list(found.values())

@@ -96,7 +96,9 @@ def _hears_too_soon(comparison: Comparison, term: Term) -> bool:
     return bool(too_soon > max(MOST_TOO_SOON * intervals.size, FEWEST_SOONER))
 
 
-def _is_silent(comparison: Comparison, station: Station, term: Term, terms: Sequence[Term]) -> bool:
+def _is_silent(
+    comparison: Comparison, station: Station, term: Term, terms: Sequence[Term]
+) -> bool:
     """Whether pulses are said to be lost one by one, where for long there is none at all.
 
     Args:

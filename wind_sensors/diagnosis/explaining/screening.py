@@ -101,7 +101,9 @@ def scores_of(templates: Sequence[Template], gram: FloatArray, seen: FloatArray)
         amplitudes = {templates[single].number: float(seen[single] / power[single])}
         if len(members) <= JOINT_TEMPLATES and len(alive) > 1:
             gain, solved = _joint(gram[np.ix_(alive, alive)], seen[alive])
-            amplitudes = {templates[k].number: float(a) for k, a in zip(alive, solved, strict=True)}
+            amplitudes = {
+                templates[k].number: float(a) for k, a in zip(alive, solved, strict=True)
+            }
         score = Score(
             *key, gain, {number: multiple * a for number, a in amplitudes.items()},
             templates[single], multiple * float(seen[single] / power[single]),

@@ -255,10 +255,7 @@ class Searcher:
         )
 
     def best_fit(
-        self,
-        whitener: Whitener,
-        current: Fit | None,
-        starts: Sequence[Term],
+        self, whitener: Whitener, current: Fit | None, starts: Sequence[Term],
         rest: Simulated | None,
     ) -> Fit:
         """Fit of known terms and one more, from the best of several starting points.
@@ -311,12 +308,15 @@ class Searcher:
             ahead = min(
                 fits,
                 key=lambda f: (
-                    interval_cost(f.terms[-1]) + self.whitener(f.simulated).deviance(f.simulated)
+                    interval_cost(f.terms[-1])
+                    + self.whitener(f.simulated).deviance(f.simulated)
                 ),
             )
         elif len(fits) > 1:
             ahead = min(fits, key=lambda f: f.cost + interval_cost(f.terms[-1]))
-        found = fit(whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY)
+        found = fit(
+            whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
+        )
         tied = without_run_aways(found.terms[-1])
         tied = tied or without_idle(found, PENALTY_PER_FURTHER_PARAMETER)
         if tied is None:
@@ -340,7 +340,9 @@ class Searcher:
         the new term gains.
         """
         station = planted(self.station, current.terms)
-        alone = fit(whitener, station, [start], current.simulated, FIRST_ITERATIONS, least=ROUGHLY)
+        alone = fit(
+            whitener, station, [start], current.simulated, FIRST_ITERATIONS, least=ROUGHLY
+        )
         slopes = None
         if current.slopes is not None and alone.slopes is not None:
             slopes = np.hstack((current.slopes, alone.slopes))

@@ -233,7 +233,9 @@ def _are_steps(values: npt.NDArray[np.floating[Any]], step: float) -> bool:
     return bool(on_steps > ON_STEPS and step < WIDEST_STEP)
 
 
-def _gap(vane: str, centre: float, width: float, form: int = 0, reading: float = 0.0) -> Term:
+def _gap(
+    vane: str, centre: float, width: float, form: int = 0, reading: float = 0.0
+) -> Term:
     return suggested(
         "potentiometer_gap", vane, centre=centre, width=width, reading=reading, form=float(form)
     )

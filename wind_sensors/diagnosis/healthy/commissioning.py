@@ -69,14 +69,15 @@ def commissioned(
             g = np.array(columns)
             # Recordings differ by more than their noise: each counts as one witness whose
             # standing scatter is a third of the tolerance.
-            inner = np.linalg.inv(
-                np.linalg.inv(g @ g.T + 1e-6 * np.eye(len(terms))) + np.eye(len(terms)) / 9.0
-            )
+            inner = np.linalg.inv(np.linalg.inv(g @ g.T + 1e-6 * np.eye(len(terms)))
+                                  + np.eye(len(terms)) / 9.0)
             estimate = np.linalg.solve(g @ g.T + 1e-6 * np.eye(len(terms)), g @ nothing[:size])
             normal += inner
             right += inner @ estimate
         amplitudes = np.linalg.solve(normal, right)
-        for (effect, name, parameter, tolerance), amplitude in zip(terms, amplitudes, strict=True):
+        for (effect, name, parameter, tolerance), amplitude in zip(
+            terms, amplitudes, strict=True
+        ):
             healthy = effect.parameters[0].healthy or 0.0
             change = tolerance * float(amplitude)
             # Factors stay positive.

@@ -115,7 +115,10 @@ def _statistics(
     channel = next(c for c in channels_of(station) if c.name == name)
     prior = daily_deviation(channel)
     rows = np.array(
-        [c.measured.statistics[name] - c.simulate(station).statistics[name] for c in comparisons]
+        [
+            c.measured.statistics[name] - c.simulate(station).statistics[name]
+            for c in comparisons
+        ]
     )
     calm = np.array([calm_deviation(prior.size, float(np.mean(c.speed))) for c in comparisons])
     weight = np.where(np.isfinite(rows), prior**2 / (prior**2 + calm**2), 0.0)
@@ -187,7 +190,9 @@ def _liveliness(comparisons: Sequence[Comparison], station: Station) -> float:
     return own
 
 
-def _activity_excess(comparisons: Sequence[Comparison], station: Station, name: str) -> FloatArray:
+def _activity_excess(
+    comparisons: Sequence[Comparison], station: Station, name: str
+) -> FloatArray:
     """Variance of the levels of quick eddies over that of as many independent coefficients.
 
     Of single segments or of means of a few, whichever scatter more: what lasts for minutes on

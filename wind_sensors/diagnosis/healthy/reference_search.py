@@ -64,11 +64,15 @@ def located(recordings: Sequence[Recording], baseline: Baseline) -> Place | None
             nothing = comparison.vector(without, trust)[:size]
             rows = np.zeros((prior.size, size))
             for k, (dx, dy) in enumerate(((PLACE_STEP, 0.0), (0.0, PLACE_STEP))):
-                moved = prepare(recording, station, replace(place, x=place.x + dx, y=place.y + dy))
+                moved = prepare(
+                    recording, station, replace(place, x=place.x + dx, y=place.y + dy)
+                )
                 white = moved.vector(moved.simulate(station), trust)[:size]
                 rows[k] = (nothing - white) / PLACE_STEP
             for channel in comparison.channels:
-                late = with_effect(station, latency, channel.instrument, {"latency": LATENCY_STEP})
+                late = with_effect(
+                    station, latency, channel.instrument, {"latency": LATENCY_STEP}
+                )
                 only = comparison.affected(station, channel.instrument)
                 white = comparison.vector(comparison.simulate(late, only, without), trust)[:size]
                 rows[2 + names.index(channel.name)] += (nothing - white) / LATENCY_STEP

@@ -120,7 +120,9 @@ def standing_means(rows: Sequence[Evidence]) -> dict[str, float]:
     every = sorted({key for row in rows for key in row.keys})
     crowd = {key: sum(_bank(k) == _bank(key) for k in every) for key in every}
     keys = [
-        key for key in every if crowd[key] <= LARGEST_SHARED_BANK and effects[key].standing > 0.0
+        key
+        for key in every
+        if crowd[key] <= LARGEST_SHARED_BANK and effects[key].standing > 0.0
     ]
     place = {key: k for k, key in enumerate(keys)}
     normal = np.eye(len(keys)) / STANDING_MEAN_PRIOR**2
@@ -164,7 +166,9 @@ def standing_sizes(rows: Sequence[Evidence], means: Mapping[str, float]) -> dict
     return out
 
 
-def loudest_gains(rows: Sequence[Evidence], calm: Sequence[bool] | None = None) -> dict[str, float]:
+def loudest_gains(
+    rows: Sequence[Evidence], calm: Sequence[bool] | None = None
+) -> dict[str, float]:
     """Largest gain that each effect promises in a healthy recording judged by the others.
 
     Args:

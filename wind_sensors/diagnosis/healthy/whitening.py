@@ -33,7 +33,9 @@ SMALLEST_DEVIATION = 0.02
 """Noise of a compared series is never taken below this [m/s], per coefficient."""
 
 
-def trust_of(comparison: Comparison, simulated: Simulated, baseline: Baseline) -> dict[str, Trust]:
+def trust_of(
+    comparison: Comparison, simulated: Simulated, baseline: Baseline
+) -> dict[str, Trust]:
     """Slope and noise of each channel, from the recording itself with the baseline's exponents.
 
     Args:

@@ -225,4 +225,7 @@ def bench_of(felt: Felt, station: Station) -> Bench:
 
     before = stacked(station, everything)
     noise = np.full(2 * count, 1.4826 * float(np.median(np.abs(before))))
-    return Bench(station, stacked, change, noise, np.tile(felt.block, 2), np.tile(felt.elapsed, 2))
+    return Bench(
+        station, stacked, change, noise, np.tile(felt.block, 2), np.tile(felt.elapsed, 2)
+    )
+

@@ -166,7 +166,8 @@ def joined(several: Sequence[Averages]) -> Averages:
 
     def column(parts: Sequence[FloatArray | None]) -> FloatArray:
         filled = [
-            np.full(len(a), np.nan) if p is None else p for a, p in zip(several, parts, strict=True)
+            np.full(len(a), np.nan) if p is None else p
+            for a, p in zip(several, parts, strict=True)
         ]
         return np.asarray(np.concatenate(filled)[row])
 

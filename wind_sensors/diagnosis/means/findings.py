@@ -112,7 +112,9 @@ def _proof(
         excess_removed=_share(gain, before, floor, everything),
         low=float(low),
         high=float(high),
-        placebo_removed=None if runner_up is None else _share(runner_up, before, floor, everything),
+        placebo_removed=None
+        if runner_up is None
+        else _share(runner_up, before, floor, everything),
     )
 
 
@@ -259,10 +261,8 @@ def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
     end = float(averages.elapsed[last])
     term = Term(catalogue()["stuck_sensor"], silence.sensor, {"start": begin, "stop": end})
     is_rotor = silence.sensor in averages.speed
-    shown = (
-        f"{silence.value:.3g} m/s"
-        if is_rotor
-        else (f"{_from_north(np.degrees(silence.value)):.1f} deg")
+    shown = f"{silence.value:.3g} m/s" if is_rotor else (
+        f"{_from_north(np.degrees(silence.value)):.1f} deg"
     )
     region = Region(
         f"{silence.sensor}/{'mean_speed' if is_rotor else 'mean_direction'}", "time", begin, end,

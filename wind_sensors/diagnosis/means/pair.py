@@ -198,7 +198,9 @@ def table_of(relative: FloatArray, speed: FloatArray, heading: FloatArray) -> Fl
     """Median of a residual relative to the wind in every cell; neighbours fill empty cells."""
     table, _ = _cell_medians(relative, speed, heading)
     overall = float(np.median(relative)) if relative.size else 0.0
-    by_sector = np.array([np.nanmean(row) if np.isfinite(row).any() else overall for row in table])
+    by_sector = np.array(
+        [np.nanmean(row) if np.isfinite(row).any() else overall for row in table]
+    )
     return np.where(np.isfinite(table), table, by_sector[:, None])
 
 

@@ -144,7 +144,9 @@ def search(
             continue
         terms = together
         cost, fits = held_out(bench, [(), ()], terms)
-        named.append(Named(terms[-1], p, costs[-1] - cost, tuple(equal), tuple(others), runner))
+        named.append(
+            Named(terms[-1], p, costs[-1] - cost, tuple(equal), tuple(others), runner)
+        )
         costs.append(cost)
         if progress:
             progress(len(named) / most)
@@ -188,7 +190,8 @@ def is_normal(healthy: Bench) -> Callable[[Term], bool]:
         if term.key not in sizes:
             start = replace(term, interval=ALWAYS)
             found = [
-                fit(healthy, (), (start,), third == k, 4)[0].relative_size for k in range(parts)
+                fit(healthy, (), (start,), third == k, 4)[0].relative_size
+                for k in range(parts)
             ]
             sizes[term.key] = max(found)
         return term.relative_size < HEALTHY_FACTOR * sizes[term.key]

@@ -104,7 +104,9 @@ def silences(averages: Averages) -> list[Silence]:
             for first, last in runs(same, 2):
                 rows = int(np.count_nonzero(windy[first - 1 : last + 1]))
                 if rows >= LONGEST_REPEAT:
-                    found.append(Silence(name, max(first - 1, 0), last, rows, float(value[last])))
+                    found.append(
+                        Silence(name, max(first - 1, 0), last, rows, float(value[last]))
+                    )
     return _joined(found)
 
 

@@ -144,7 +144,9 @@ def _squares_in_quarters(comparison: Comparison, change: FloatArray) -> FloatArr
     white = np.zeros((len(comparison.channels), comparison.grid.n))
     white[:, :n] = change[: n * len(comparison.channels)].reshape(-1, n)
     squares = [spectra.from_cosine(each) ** 2 for each in white]
-    return np.array([[part.sum() for part in np.array_split(each, QUARTERS)] for each in squares])
+    return np.array(
+        [[part.sum() for part in np.array_split(each, QUARTERS)] for each in squares]
+    )
 
 
 def varies(naming: Naming, station: Station) -> bool:
@@ -409,7 +411,9 @@ def goes_with_speed(naming: Naming, station: Station) -> bool:
     """
     for term in naming.fit.terms:
         effect = term.effect
-        own_law = effect.own_law or effect.noisy or effect.occasional or effect.entrance == "clock"
+        own_law = (
+            effect.own_law or effect.noisy or effect.occasional or effect.entrance == "clock"
+        )
         if own_law or effect.legible or term.is_told:
             continue
         share = WITH_SPEED_EXACT_SHARE if effect.exact else WITH_SPEED_SHARE

@@ -56,7 +56,8 @@ def blocks_for(acting: Sequence[FloatArray]) -> int:
     shown = [one for one in acting if float(one.sum()) > ACTS_IN_SERIES]
     while blocks < FINEST * BLOCKS:
         shares = [
-            float(one[_block_numbers(one.size, blocks) % 2 == 1].sum() / one.sum()) for one in shown
+            float(one[_block_numbers(one.size, blocks) % 2 == 1].sum() / one.sum())
+            for one in shown
         ]
         if all(LEAST_IN_A_HALF < share < 1.0 - LEAST_IN_A_HALF for share in shares):
             return blocks
@@ -114,7 +115,9 @@ class Side:
         return self.whitener.of(self.healthy)
 
 
-def side_of(whitener: Whitener, station: Station, mask: FloatArray, blocks: int = BLOCKS) -> Side:
+def side_of(
+    whitener: Whitener, station: Station, mask: FloatArray, blocks: int = BLOCKS
+) -> Side:
     """The blocks of a mask.
 
     Args:
@@ -248,7 +251,9 @@ def scored(
     return Fold(before[used], after[used], floor, vector, fitted)
 
 
-def removed(folds: Sequence[Fold], picks: Sequence[npt.NDArray[np.intp]] | None = None) -> float:
+def removed(
+    folds: Sequence[Fold], picks: Sequence[npt.NDArray[np.intp]] | None = None
+) -> float:
     """Share of the excess misfit that is gone on the scored blocks.
 
     Args:

@@ -167,7 +167,9 @@ def judgement_of(
     ) if verdict in {"named", "ambiguous"} else ()  # fmt: skip
     report("proving")(1.0)
     structured = located(naming, bank, comparison, baseline).is_structure
-    upheld = _upheld(verdict, findings, naming, comparison, baseline.station, structured, workers)
+    upheld = _upheld(
+        verdict, findings, naming, comparison, baseline.station, structured, workers
+    )
     verdict = upheld.verdict
     if verdict == "none" and comparison.repeated > REPEATED:
         # The instruments are well, but the recording is not.

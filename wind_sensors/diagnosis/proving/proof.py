@@ -140,7 +140,9 @@ def prove(
     )
 
 
-def _acting(whitener: Whitener, station: Station, terms: Sequence[Term], term: Term) -> FloatArray:
+def _acting(
+    whitener: Whitener, station: Station, terms: Sequence[Term], term: Term
+) -> FloatArray:
     """Squares of what one of several effects changes in each bin, in units of noise, shape (n,)."""
     comparison = whitener.comparison
     after = comparison.simulate(planted(station, terms))

@@ -153,7 +153,9 @@ def determined(findings: tuple[Finding, ...]) -> bool:
 
 def _has_a_size(finding: Finding) -> bool:
     effect = finding.term.effect
-    graded = [p for p in effect.parameters if p.graded and p.minimum > 0.0]
+    graded = [
+        p for p in effect.parameters if p.graded and p.minimum > 0.0
+    ]
     if effect.size is not None or not graded:
         return True
     known = [(p.healthy or 0.0, finding.parameters.get(p.name)) for p in graded]

@@ -23,7 +23,9 @@ GROSS = 1.7
 """Misfit relative to the usual that is told even if no effect explains it."""
 
 
-def confirmed(since: Sequence[Evidence], named: Sequence[Candidate], usual: UsualMisfit) -> bool:
+def confirmed(
+    since: Sequence[Evidence], named: Sequence[Candidate], usual: UsualMisfit
+) -> bool:
     """Whether a large enough cause removes misfit, or much misfit is there.
 
     Sums of many blocks notice differences that are real but too small to matter. If a cause too

@@ -142,7 +142,9 @@ def oddities(
     for instrument in station.instruments:
         name = instrument.name
         if isinstance(instrument, Rotor) and name in pulses:
-            found.append(_rotor(name, recording.pulses.get(name), pulses[name], start, stop, speed))
+            found.append(
+                _rotor(name, recording.pulses.get(name), pulses[name], start, stop, speed)
+            )
             channel = f"{name}/rotor_rate"
             found.append(
                 _intervals(

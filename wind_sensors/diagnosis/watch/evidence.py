@@ -186,7 +186,9 @@ class Learning:
         """Standing amplitudes; each is expected within one smallest size."""
         out = np.zeros(len(registry.templates))
         known = {name for name, _, _ in STANDING_TOLERANCES}
-        used = [k for k in range(self.right.size) if registry.templates[k].effect.name in known]
+        used = [
+            k for k in range(self.right.size) if registry.templates[k].effect.name in known
+        ]
         if used:
             prior = np.diag([unit(registry.templates[k]) ** 2 for k in used])
             normal = self.normal[np.ix_(used, used)] + prior

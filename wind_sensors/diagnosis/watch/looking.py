@@ -140,7 +140,9 @@ def _candidate(term: Term, weight: float, explained: float, gain: float) -> Cand
     )
 
 
-def _located(diagnosis: Diagnosis, found: Found, interval: tuple[float, float | None]) -> Located:
+def _located(
+    diagnosis: Diagnosis, found: Found, interval: tuple[float, float | None]
+) -> Located:
     """The channel of a region, with what it shows while the effect holds."""
     comparison = diagnosis.comparison
     channel = found.region.channel

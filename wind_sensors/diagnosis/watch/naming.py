@@ -144,7 +144,9 @@ def _tried(
     """Best cost and values of an effect along rays from health through its starting points."""
     effect = score.template.effect
     newest = snapshots[-1:]
-    options = [effect.scaled(start, factor) for start in _starts(score) for factor in _COARSE_SIZES]
+    options = [
+        effect.scaled(start, factor) for start in _starts(score) for factor in _COARSE_SIZES
+    ]
     costs = [_cost(newest, station, Template(effect, score.instrument, 0, v)) for v in options]
     start = options[int(np.argmin(costs))]
     return min(costs), score, start

@@ -33,15 +33,8 @@ def _sources(recording: Recording, watch: Watch) -> Iterator[tuple[TimeArray, Fe
     if wind is not None:
         yield wind.time, lambda i, t: watch.add_wind(t, wind.velocity[i])
     if states is not None:
-        yield (
-            states.time,
-            lambda i, t: watch.add_platform(
-                t,
-                states.attitude[i],
-                states.velocity[i],
-                states.angular_rate[i],
-                states.position[i],
-            ),
+        yield states.time, lambda i, t: watch.add_platform(
+            t, states.attitude[i], states.velocity[i], states.angular_rate[i], states.position[i]
         )
     warmth, weight = recording.temperature, recording.pressure
     if warmth is not None:

@@ -98,7 +98,9 @@ class SequentialTest:
         self.last = np.append(self.last, np.full(more, np.nan))
         self.wander_weight = np.append(self.wander_weight, np.full(more, _WANDER_BLOCKS))
 
-    def add(self, block: int, departure: FloatArray, precision: FloatArray) -> None:
+    def add(
+        self, block: int, departure: FloatArray, precision: FloatArray
+    ) -> None:
         """One block.
 
         Args:

@@ -18,7 +18,9 @@ LEAST_USUAL = 0.2
 and would drown all else here."""
 
 
-def windy_changes(speed: FloatArray, mask: FloatArray | None = None) -> npt.NDArray[np.bool_]:
+def windy_changes(
+    speed: FloatArray, mask: FloatArray | None = None
+) -> npt.NDArray[np.bool_]:
     """Which changes from bin to bin count, shape (n - 1,).
 
     Args:

@@ -75,7 +75,9 @@ _WAVES = (0.6, 1.25)
 """Waves per degree: for steps from 0.8 degrees on, a multiple of one over the step is there."""
 
 
-def step_statistics(angles: Angles, grid: Grid, mask: FloatArray | None = None) -> FloatArray:
+def step_statistics(
+    angles: Angles, grid: Grid, mask: FloatArray | None = None
+) -> FloatArray:
     """How far a vane's readings come in even steps, 0 (not at all) to 1 (all of them).
 
     Steps tell themselves by readings that lie a whole number of them apart. A vane that sticks
@@ -152,7 +154,9 @@ def _lengths_of_stands(readings: list[float]) -> list[int]:
     return lengths
 
 
-def _counted_readings(angles: Angles, grid: Grid, mask: FloatArray | None) -> npt.NDArray[np.bool_]:
+def _counted_readings(
+    angles: Angles, grid: Grid, mask: FloatArray | None
+) -> npt.NDArray[np.bool_]:
     """Readings that are numbers, inside the bins that count."""
     place = np.floor(grid.seconds(angles.time) / grid.dt).astype(np.intp)
     counted = np.isfinite(angles.angle) & (place >= 0) & (place < grid.n)
