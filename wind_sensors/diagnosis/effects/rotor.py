@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wind_sensors.diagnosis.effects.definition import Effect, Parameter, Values
+from wind_sensors.instruments.dynamics.rotor import STALL_SLIP
 from wind_sensors.station.model import Angle, Cup, Instrument, Platform, Propeller, Rotor, Station
 
 Entry = Instrument | Platform
@@ -91,7 +92,7 @@ BEARING_FRICTION = Effect(
     equation="l0 dy/dt = (U - y)(a4 U + (1 - a4) y) - U_s^2 exp(c (T - T0)); "
     "steady y = U - U_s^2/U; towards rest a cup's friction rises to `breakaway` times as much, "
     "as exp(-(y / 1 m/s)^2), and a propeller's torque falls to as small a part, as its blades "
-    "stall at 36 % slip",
+    f"stall at {100.0 * STALL_SLIP:.0f} % slip",
     source="J80, eqs. (5), (6)",
     region="low speeds; the rotor stalls below U_s",
     occasional=True,
