@@ -441,6 +441,16 @@ def test_what_takes_back_a_part_of_the_other_is_real_if_that_one_shows_alone(
     assert made_up((friction, damping), prepare(recorded(STATION, 65)), together) is made
 
 
+def test_mass_and_damping_of_one_swing_are_both_told_though_they_undo_each_other() -> None:
+    heavy = replace(_finding("vane_inertia", "vane", 0.3, 0.002), gain=110.0)
+    damped = replace(_finding("vane_damping", "vane", 0.9, 0.002), gain=900.0)
+    comparison = prepare(recorded(STATION, 65))
+    assert not made_up((damped, heavy), comparison, 280.0)
+    # What stands out nowhere is put together still.
+    unseen = replace(heavy, gain=30.0, p=0.4)
+    assert made_up((damped, unseen), comparison, 280.0)
+
+
 def test_a_rival_in_an_ambiguous_set_needs_no_place_of_its_own() -> None:
     rival = replace(_finding(*ASYMMETRY, 0.9, 0.5), proof=None)
     found = (_finding(*OFFSET, 0.9, 0.002), rival)

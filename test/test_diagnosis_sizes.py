@@ -10,7 +10,7 @@ from diagnosis_cases import STATION, baseline, diagnosed, recorded
 
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.definition import with_effect
+from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
 from wind_sensors.diagnosis.explaining.acceptance import (
     SMALLEST_SIZE,
     SMALLEST_SURE,
@@ -470,3 +470,14 @@ def test_a_dead_time_is_reported_without_losses_that_nobody_sees() -> None:
     (finding,) = diagnose(recorded(station, 82), baseline(), with_proof=False).findings
     assert set(finding.parameters) == {"dead_time"}
     assert finding.term.values["loss_probability"] == 0.0
+
+
+def test_a_heavy_vane_that_is_damped_too_is_both() -> None:
+    """At the resonance the one takes back most of what the other does there."""
+    swinging = {"inertia_factor": 2.2, "damping_factor": 2.5}
+    found = diagnose(recorded(with_keys(STATION, "vane", swinging), 73), baseline())
+    assert found.verdict == "named"
+    sizes = {f.term.effect.name: f.term.values for f in found.findings}
+    assert set(sizes) == {"vane_inertia", "vane_damping"}
+    assert sizes["vane_inertia"]["inertia_factor"] == pytest.approx(2.2, rel=0.15)
+    assert sizes["vane_damping"]["damping_factor"] == pytest.approx(2.5, rel=0.15)

@@ -105,6 +105,20 @@ def test_what_always_holds_is_spared_the_price_of_a_beginning_and_an_end() -> No
     assert gain_over((0.5, 590.0)) - gain_over(ALWAYS) == pytest.approx(edges, abs=0.5)
 
 
+def test_a_cable_that_the_vane_winds_up_is_no_weight_on_a_leaning_mast() -> None:
+    wound = with_keys(STATION, "vane", {"cable_speed": 1.5, "cable_rest_deg": 150.0})
+    naming = diagnose(recorded(wound, 68, mean=5.0), baseline(), with_proof=False).naming
+    weight = {"imbalance": 4.0, "tilt_x": 1.0, "tilt_y": 0.5}
+    heavy = Term(catalogue()["vane_imbalance"], "vane", weight)
+    suspicion = suspicion_of(
+        replace(naming, fit=fit(naming.whitener, STATION, [heavy])), STATION
+    )
+    assert suspicion is not None
+    assert (suspicion.fault.key, suspicion.effect) == (("cable", "vane"), "vane_imbalance")
+    assert suspicion.fault.values["speed"] == pytest.approx(1.5, rel=0.15)
+    assert suspicion.fault.values["rest"] == pytest.approx(150.0, abs=12.0)
+
+
 def test_a_fin_that_gives_way_is_no_heavy_vane() -> None:
     soft = with_keys(STATION, "vane", {"fin_yield_speed": 6.0})
     naming = diagnose(recorded(soft, 68, mean=6.0), baseline(), with_proof=False).naming

@@ -129,8 +129,9 @@ def test_the_inverse_rotor_equation_gives_the_wind_back(
     assert found == pytest.approx(speed, rel=1e-9)
 
 
-def test_the_inverse_vane_equation_gives_the_direction_back() -> None:
-    vane = mast(vane={"inertia_factor": 1.4}).instruments[1]
+@pytest.mark.parametrize("cable", [{}, {"cable_speed": 1.5, "cable_rest_deg": -130.0}])
+def test_the_inverse_vane_equation_gives_the_direction_back(cable: dict[str, float]) -> None:
+    vane = mast(vane={"inertia_factor": 1.4, **cable}).instruments[1]
     assert isinstance(vane, Vane)
     p = vane_parameters(vane)
     x, y = -6.0 * np.cos(0.8), -6.0 * np.sin(0.8)

@@ -180,6 +180,20 @@ def test_a_fin_that_gives_way_swings_more_slowly_in_strong_wind_only():
         assert slower == pytest.approx(share**-0.5, rel=0.02)
 
 
+def test_a_cable_pulls_a_vane_back_to_where_it_is_not_wound_up():
+    """Against the balance of torques, in winds of several speeds and after a whole turn."""
+    wound = vane(cable_speed=1.0, cable_rest_deg=60.0, damping_ratio=0.7)
+    for speed in (3.0, 6.0):
+        for end in (0.0, 40.0, 360.0):
+            turning = np.radians(np.interp(np.arange(3000), (0, 2000), (0.0, end)))
+            wind = -speed * np.stack((np.cos(turning), np.sin(turning), 0.0 * turning), axis=1)
+            drive = Drive(START, 0.05, wind)
+            angle = respond(Station(instruments=(wound,)), drive).angles["vane"].angle[-1]
+            to_wind = speed**2 * np.sin(np.radians(end) - angle)
+            assert abs(np.degrees(angle) - end) < 90.0
+            assert to_wind == pytest.approx(angle - np.radians(60.0), rel=1e-4)
+
+
 def test_oil_in_the_bearing_damps_a_vane_by_as_much_in_any_wind():
     oiled = vane(viscous_damping=4.0, inertia_factor=1.5)
     rate = 4.0 * 2.0 * oiled.damping_ratio * 8.0 / oiled.distance_constant / 1.5

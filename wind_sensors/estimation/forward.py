@@ -57,7 +57,7 @@ class Instruments(NamedTuple):
         response: Angular response tables, shape (rotors, 181).
         mounting: Kind, index of the carrying vane, arm [m], axis x, y, z, reference density
             [kg/m^3]; shape (rotors, 7).
-        vane: `VaneParameters` of each nose axis, shape (vanes, 12).
+        vane: `VaneParameters` of each nose axis, shape (vanes, 14).
         vane_density: Reference densities [kg/m^3], shape (vanes,).
         azimuth: For the elevation of a bivane the index of its azimuth, else -1; shape (vanes,).
         shadow: Wake shadows of rotors then vanes: bearing of its middle against x [rad], depth,
@@ -94,7 +94,9 @@ def rotor_of(s: Instruments, i: int) -> RotorParameters:
 def vane_with_friction(s: Instruments, i: int) -> VaneParameters:
     """Constants of vane i."""
     v = s.vane[i]
-    return VaneParameters(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11])
+    return VaneParameters(
+        v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11], v[12], v[13]
+    )
 
 
 @compiled
@@ -109,7 +111,9 @@ def vane_of(s: Instruments, i: int) -> VaneParameters:
     """Constants of vane i without friction: a vane that sticks has no slope that a filter could
     follow. It is added smoothly, and what it withstands at rest is left to the filter's noise."""
     v = s.vane[i]
-    return VaneParameters(v[0], v[1], v[2], v[3], 0.0, v[5], v[6], 0.0, v[8], v[9], v[10], v[11])
+    return VaneParameters(
+        v[0], v[1], v[2], v[3], 0.0, v[5], v[6], 0.0, v[8], v[9], v[10], v[11], v[12], v[13]
+    )
 
 
 @compiled

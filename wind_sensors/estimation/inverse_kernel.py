@@ -197,6 +197,9 @@ def wind_heading_from_motion(
     if p.imbalance != 0.0:
         across = -pull[0] * math.sin(phi) + pull[1] * math.cos(phi)
         other -= p.imbalance / p.inertia_factor * across
+    if p.cable > 0.0:
+        length = p.distance_constant
+        other += p.cable / (length * length * p.inertia_factor) * (phi - p.cable_rest)
     if p.friction > 0.0:
         length = p.distance_constant
         grip = p.friction / (length * length * p.inertia_factor)

@@ -316,6 +316,10 @@ class Vane(Angle):
     """Standard width of the place."""
     fin_yield_speed: NonNegative = 0.0
     """Wind in which the fin, bent away, holds by half the force of a stiff one [m/s]; 0: stiff."""
+    cable_speed: NonNegative = 0.0
+    """h_k [m/s]: a cable that the vane winds up pulls per angle as wind of h_k does."""
+    cable_rest_deg: float = 0.0
+    """Heading at which it is not wound up; counted on over turns, so it may lie beyond 180."""
 
 
 class Bivane(Angle):

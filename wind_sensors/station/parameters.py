@@ -103,4 +103,6 @@ def vane_parameters(vane: Angle) -> VaneParameters:
         catch_heading=float(np.radians(vane.catch_heading_deg)),
         catch_width=float(np.radians(vane.catch_width_deg)),
         softness=vane.fin_yield_speed**-2 if vane.fin_yield_speed > 0.0 else 0.0,
+        cable=vane.cable_speed**2,
+        cable_rest=float(np.radians(vane.cable_rest_deg)),
     )

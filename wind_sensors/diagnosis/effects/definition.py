@@ -126,6 +126,9 @@ class Effect:
             whether the disc or a cup makes them.
         own_law: How it changes with the wind's speed differs from one cause to another: a stiff
             grease damps a vane less and less against the wind's own damping as the wind grows.
+        constant_of: The linear equation of which it is one of the constants; empty: of none. Two of
+            them may take each other back in one property, as mass and damping do in the power at
+            the resonance, and the equation tells both.
         goes_with_direction: It is another one in wind from elsewhere, and has to show that.
         one_by_one: It hits one pulse here and one there, by chance, whatever became of those
             before: what comes in bursts is something else.
@@ -168,6 +171,7 @@ class Effect:
     unmistakable: bool = False
     stirs: bool = False
     own_law: bool = False
+    constant_of: str = ""
     goes_with_direction: bool = False
     one_by_one: bool = False
     loose_statistics: frozenset[str] = frozenset()

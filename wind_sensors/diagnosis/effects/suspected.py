@@ -146,6 +146,38 @@ SOFT_FIN = Effect(
     },
 )
 
+
+def _cable(entry: Entry, values: Values) -> dict[str, Any]:
+    assert isinstance(entry, Vane)
+    return {"cable_speed": values["speed"], "cable_rest_deg": values["rest"]}
+
+
+CABLE = Effect(
+    name="cable",
+    meaning="a cable that the vane winds up",
+    entrance="response",
+    equation="torque -(h_k/l_v)^2 (phi - phi_k)",
+    source="torsion of a cable or of a spring, linear in the angle",
+    region="headings far from the one at rest, in weak wind",
+    parameters=(
+        Parameter("speed", "m/s", 0.0, 8.0, minimum=0.9, step=0.1),
+        Parameter("rest", "deg", -1080.0, 1080.0, healthy=None, step=3.0),
+    ),
+    applies=_turns_about_the_vertical,
+    update=_cable,
+    templates=tuple(
+        {"speed": speed, "rest": rest}
+        for speed in (0.8, 1.6)
+        for rest in np.arange(-180.0, 180.0, 30.0).tolist()
+    ),
+    confusable={
+        "vane_imbalance": "lean the mast the other way: gravity follows, the cable does not",
+        "vane_eccentricity": "turn the vane by hand and let go of it in still air",
+        "vane_offset": "turn the vane by hand and let go of it in still air",
+        "heading_deviation": "turn the vane by hand and let go of it in still air",
+    },
+)
+
 ARMS = 3
 """Of a sonic's head, evenly spaced."""
 
@@ -193,5 +225,5 @@ REFERENCE_SHADOW = Effect(
     },
 )
 
-SUSPECTS = (PLAY, SLEW_LIMIT, CATCH, SOFT_FIN, REFERENCE_SHADOW)
+SUSPECTS = (PLAY, SLEW_LIMIT, CATCH, SOFT_FIN, CABLE, REFERENCE_SHADOW)
 """All of them, in the order in which they are tried."""

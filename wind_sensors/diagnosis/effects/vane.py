@@ -69,6 +69,7 @@ VANE_INERTIA = Effect(
     applies=is_vane,
     update=_inertia,
     form_error=0.1,
+    constant_of="swing of a vane",
     templates=({"inertia_factor": 1.4}, {"inertia_factor": 3.0}),
     confusable={
         "vane_damping": "a release test from 10 degrees",
@@ -106,6 +107,7 @@ VANE_DAMPING = Effect(
     update=_damping,
     form_error=0.15,
     own_law=True,
+    constant_of="swing of a vane",
     templates=(
         {"damping_factor": 1.4, "viscous": 0.0},
         {"damping_factor": 0.6, "viscous": 0.0},

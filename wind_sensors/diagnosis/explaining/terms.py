@@ -97,6 +97,16 @@ def planted(station: Station, terms: Sequence[Term]) -> Station:
     return station
 
 
+def of_one_equation(terms: Sequence[Term]) -> bool:
+    """Whether terms are constants of one linear equation of one instrument, which tells each.
+
+    Args:
+        terms: Some terms.
+    """
+    equations = {(t.effect.constant_of, t.instrument) for t in terms}
+    return len(terms) > 1 and len(equations) == 1 and terms[0].effect.constant_of != ""
+
+
 def simulated_with(comparison: Comparison, station: Station, terms: Sequence[Term]) -> Simulated:
     """Simulation with a part of an explanation; without any effect, if that part cannot be.
 

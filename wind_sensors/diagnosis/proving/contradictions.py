@@ -16,7 +16,13 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import bursts_of_bou
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import cell_signatures, window_of
 from wind_sensors.diagnosis.explaining.moments import squares_in_parts
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, planted
+from wind_sensors.diagnosis.explaining.terms import (
+    ALWAYS,
+    Interval,
+    Term,
+    of_one_equation,
+    planted,
+)
 from wind_sensors.diagnosis.healthy.whitening import in_series
 from wind_sensors.station.model import Cup, Propeller, Station
 
@@ -64,9 +70,11 @@ SPEED_TIME = 5.0
 WITH_SPEED = 14.0
 WITH_SPEED_SHARE = 0.02
 WITH_SPEED_EXACT_SHARE = 0.005
+WITH_SPEED_FORM = 0.4
 """An effect has one size in weak wind and in strong wind, which blows within so many seconds: a
 size that grows or shrinks with the speed must not drop the cost by more than the second, or than
-this share of the gain; the last where the form is certain. A fin that gives way is taken for a
+this share of the gain: the third, where the form is certain the fourth, and where a size is known
+to err by its form so many times that error. A fin that gives way is taken for a
 heavy vane otherwise, a cable that pulls for a disc off centre."""
 
 DISCORD = 10.0
@@ -92,13 +100,14 @@ bursts each had 10 to 21 times, and 2.9 to 13 squares."""
 def undo_each_other(naming: Naming, station: Station) -> bool:
     """Whether two effects take back on some instrument, all the time, most of what each does there.
 
-    Unless the statistics of its raw signals show, un-undone, that something is done.
+    Unless the statistics of its raw signals show, un-undone, that something is done, or they are
+    constants of one equation.
 
     Args:
         naming: The explanation.
         station: As commissioned.
     """
-    if len(naming.fit.terms) < 2:
+    if len(naming.fit.terms) < 2 or of_one_equation(naming.fit.terms):
         return False
     comparison = naming.whitener.comparison
     trust = naming.whitener.trust
@@ -416,7 +425,9 @@ def goes_with_speed(naming: Naming, station: Station) -> bool:
         )
         if own_law or effect.legible or term.is_told:
             continue
-        share = WITH_SPEED_EXACT_SHARE if effect.exact else WITH_SPEED_SHARE
+        share = max(WITH_SPEED_SHARE, WITH_SPEED_FORM * effect.form_error)
+        if effect.exact:
+            share = WITH_SPEED_EXACT_SHARE
         if dependence_on_speed(naming, station, term) > max(WITH_SPEED, share * naming.gain):
             return True
     return False

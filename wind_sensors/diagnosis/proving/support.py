@@ -7,7 +7,7 @@ import math
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.moments import needs_to_be_steady
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER
-from wind_sensors.diagnosis.explaining.terms import ALWAYS
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, of_one_equation
 from wind_sensors.diagnosis.proving.findings import Finding
 
 SHOWN_P = 0.05
@@ -59,8 +59,8 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     """Whether several effects were put together that the data do not show one by one.
 
     One of them stands out nowhere, though it brings little or not on signals of its own, or each
-    has to make good what the other does to the same signals. A delay makes good
-    no damping.
+    has to make good what the other does to the same signals. A delay makes good no damping, and of
+    two constants of one equation either shows beside the other.
 
     Args:
         findings: What is said.
@@ -86,6 +86,8 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
         least += PENALTY_PER_FURTHER_PARAMETER * max(len(f.parameters) - 1, 0)
         if f.p > SHOWN_P and f.share < OWN_SHARE and f.gain <= least:
             return True
+    if of_one_equation([f.term for f in own]):
+        return False
     delayed = any(f.term.effect.entrance == "clock" and f.gain > SURE_BESIDE_GAIN for f in own)
     if delayed or not set.intersection(*reached) or any(_is_counted(f) for f in own):
         return False

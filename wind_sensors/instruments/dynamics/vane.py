@@ -5,9 +5,11 @@ speed across the vane's axis and Omega the yaw rate of the mount::
 
     phi'' = -2 zeta (h/l_v) (phi' + Omega) - (h/l_v)^2 sin(phi - alpha) - Omega'
             + (-b g_x sin phi + b g_y cos phi) - (h_f/l_v)^2 sgn(phi') - c phi'
+            - (h_k/l_v)^2 (phi - phi_k)
 
 (Kristensen (1994), (36) to (43), with sin for large deviations). Damping acts on the turning
-against the air, friction and an oil in the bearing on the turning against the mount.
+against the air, friction and an oil in the bearing on the turning against the mount. A cable that
+the vane winds up pulls it back to phi_k, the more, the farther and the more often it has turned.
 """
 
 from __future__ import annotations
@@ -52,6 +54,10 @@ class VaneParameters(NamedTuple):
     """1/h_y^2 [s^2/m^2]: a fin that bends away holds by 1/(1 + h^2/h_y^2) of a stiff one's."""
     viscosity: float = 0.0
     """c [1/s]: torque of the oil in the bearing per turning rate and healthy moment of inertia."""
+    cable: float = 0.0
+    """h_k^2 [m^2/s^2]: a cable pulls per radian as wind of h_k does at a small angle."""
+    cable_rest: float = 0.0
+    """Heading at which the cable is not wound up, counted on over turns [rad]."""
 
 
 @compiled
@@ -113,11 +119,15 @@ def _acceleration(
 
 @inlined
 def _pull(p: VaneParameters, phi: float, gravity_x: float, gravity_y: float) -> float:
-    """Angular acceleration of a vane out of balance [rad/s^2]."""
-    if p.imbalance == 0.0:
-        return 0.0
-    across = gravity_y * math.cos(phi) - gravity_x * math.sin(phi)
-    return p.imbalance / p.inertia_factor * across
+    """Angular acceleration of a vane out of balance, or that winds up a cable [rad/s^2]."""
+    pull = 0.0
+    if p.imbalance != 0.0:
+        across = gravity_y * math.cos(phi) - gravity_x * math.sin(phi)
+        pull = p.imbalance / p.inertia_factor * across
+    if p.cable > 0.0:
+        length = p.distance_constant
+        pull -= p.cable / (length * length * p.inertia_factor) * (phi - p.cable_rest)
+    return pull
 
 
 _SMALL_TURN = 0.25
@@ -185,10 +195,12 @@ def advance_vane(
     omega = h_largest / p.distance_constant * math.sqrt(stiffness)
     rate = omega * max(1.0, 2.0 * p.damping_ratio * p.damping_factor * math.sqrt(stiffness))
     rate += p.viscosity / p.inertia_factor
+    rate += math.sqrt(p.cable / p.inertia_factor) / p.distance_constant
     substeps = 1 + int(2.0 * dt * rate)
     if p.friction > 0.0 or p.catch > 0.0:
         substeps = max(substeps, 4)
     step = dt / substeps
+    pulled = p.imbalance != 0.0 or p.cable > 0.0
     yaw_acceleration = (yaw_rate[1] - yaw_rate[0]) / dt
     pace = density_ratio / (p.inertia_factor * p.distance_constant)
     c = math.cos(phi - p.aerodynamic_offset)
@@ -226,7 +238,7 @@ def advance_vane(
         v_2 = phi_rate + 0.5 * step * k_1
         d_2 = 0.5 * step * phi_rate
         cosine, sine = small_turn(d_2)
-        if p.imbalance != 0.0:
+        if pulled:
             pushed = _pull(p, phi + d_2, gravity[0], gravity[1]) - yaw_acceleration
         k_2 = drag + _acceleration(
             p, v_2, h_h, across_h * cosine - along_h * sine, v_2 + turn_h, pushed, pace
@@ -234,7 +246,7 @@ def advance_vane(
         v_3 = phi_rate + 0.5 * step * k_2
         d_3 = 0.5 * step * v_2
         cosine, sine = small_turn(d_3)
-        if p.imbalance != 0.0:
+        if pulled:
             pushed = _pull(p, phi + d_3, gravity[0], gravity[1]) - yaw_acceleration
         k_3 = drag + _acceleration(
             p, v_3, h_h, across_h * cosine - along_h * sine, v_3 + turn_h, pushed, pace
@@ -242,7 +254,7 @@ def advance_vane(
         v_4 = phi_rate + step * k_3
         d_4 = step * v_3
         cosine, sine = small_turn(d_4)
-        if p.imbalance != 0.0:
+        if pulled:
             pushed = _pull(p, phi + d_4, gravity[0], gravity[1]) - yaw_acceleration
         along_1 = x_1 * c + y_1 * s
         across_1 = y_1 * c - x_1 * s
