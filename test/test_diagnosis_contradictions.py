@@ -78,6 +78,20 @@ def test_thin_air_shows_on_the_vane_as_well(
     assert is_discordant(naming, STATION) is discordant
 
 
+@pytest.mark.parametrize("off_centre", [False, True])
+def test_what_gravity_does_to_a_vane_falls_with_the_square_of_the_speed(off_centre: bool) -> None:
+    """An eccentric disc errs by as much in strong wind, a weight on a leaning mast does not."""
+    weight = {"imbalance": 15.0, "tilt_deg": (1.5, 2.0)}
+    disc = {"eccentricity_deg": 6.0, "eccentricity_phase_deg": 40.0}
+    wrong = with_keys(STATION, "vane", disc if off_centre else weight)
+    searcher = searcher_of(prepare(recorded(wrong, 73)), baseline(), catalogue(), {})
+    pulled = {"imbalance": 15.0, "tilt_x": 0.5, "tilt_y": 0.7}
+    term = Term(catalogue()["vane_imbalance"], "vane", pulled)
+    naming = named(searcher, searcher.whitener(searcher.bank.without), term)
+    assert naming.gain > 40.0
+    assert goes_with_speed(naming, STATION) is off_centre
+
+
 @pytest.mark.parametrize("with_speed", [False, True])
 def test_an_offset_is_the_same_in_strong_wind(with_speed: bool) -> None:
     recording = recorded(STATION, 73)

@@ -135,6 +135,27 @@ def test_slots_that_become_uneven_show_from_then_on() -> None:
     assert np.abs(shown[: begin[0] - 1]).max() < 0.1 * shown[begin].min()
 
 
+@pytest.mark.parametrize("since", [0.0, 120.0])
+def test_what_is_locked_to_a_wind_that_turns_is_not_the_disc(since: float) -> None:
+    """Cups that pull more in one direction of the wind, once and three times per turn."""
+    displaced = 0.03 * np.random.default_rng(3).standard_normal(SLOTS)
+    displaced -= np.mean(displaced)
+    time = edges(displaced, since)
+    wind_from = 0.8 * np.sin(time / 40.0) + 0.004 * time
+    angle = 2.0 * np.pi * np.arange(time.size) / SLOTS - wind_from
+    pulled = time + TURN / SLOTS * (0.04 * np.cos(angle) + 0.02 * np.cos(3.0 * angle + 0.5))
+    seen, even = (slot_intervals(t, SLOTS) for t in (pulled, time))
+    aside, left = seen.without_what_turns(np.interp(seen.begin, time, wind_from))
+    end = TURNS * TURN
+    if since == 0.0:
+        assert left < 0.1 * seen.left_by(0.0, end)
+        assert aside.displacements(0.0, end) == pytest.approx(displaced, abs=0.003)
+        assert np.abs(seen.displacements(0.0, end) - displaced).max() > 0.02
+    # Slots that become uneven while the wind turns remain slots.
+    _, left = even.without_what_turns(np.interp(even.begin, time, wind_from))
+    assert (left > even.left_by(since, end)) is (since > 0.0)
+
+
 def test_the_place_of_each_slot_is_read_off_the_pulses() -> None:
     displaced = np.clip(0.15 * np.random.default_rng(5).standard_normal(SLOTS), -0.3, 0.3)
     displaced -= np.mean(displaced)

@@ -126,6 +126,8 @@ class Effect:
             whether the disc or a cup makes them.
         own_law: How it changes with the wind's speed differs from one cause to another: a stiff
             grease damps a vane less and less against the wind's own damping as the wind grows.
+        fades: What it does falls with the square of the wind's speed, which tells it from others
+            that do as much with the direction.
         constant_of: The linear equation of which it is one of the constants; empty: of none. Two of
             them may take each other back in one property, as mass and damping do in the power at
             the resonance, and the equation tells both.
@@ -171,6 +173,7 @@ class Effect:
     unmistakable: bool = False
     stirs: bool = False
     own_law: bool = False
+    fades: bool = False
     constant_of: str = ""
     goes_with_direction: bool = False
     one_by_one: bool = False

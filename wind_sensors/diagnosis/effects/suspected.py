@@ -167,7 +167,7 @@ CABLE = Effect(
     update=_cable,
     templates=tuple(
         {"speed": speed, "rest": rest}
-        for speed in (0.8, 1.6)
+        for speed in (0.7, 1.2, 2.0)
         for rest in np.arange(-180.0, 180.0, 30.0).tolist()
     ),
     confusable={

@@ -183,6 +183,7 @@ VANE_IMBALANCE = Effect(
     region="low speeds, on a mount that leans or accelerates",
     occasional=True,
     own_days=True,
+    fades=True,
     parameters=(
         Parameter(
             "imbalance", "1/m", -MOST_IMBALANCE, MOST_IMBALANCE, minimum=SMALLEST_IMBALANCE,

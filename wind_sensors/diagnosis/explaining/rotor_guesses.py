@@ -16,7 +16,7 @@ from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
 from wind_sensors.diagnosis.explaining.ruled_out import comes_sooner
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, suggested
 from wind_sensors.station.losses import LOSS_SPEED
-from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.model import Cup, Rotor, Station
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -173,6 +173,11 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     if slots > 2 and max(scatter, once) > 0.003:
         seen = slot_intervals(time, slots)
         holds = _uneven_span(comparison, seen)
+        if isinstance(rotor, Cup):
+            wind_from = np.interp(seen.begin, comparison.grid.centres, comparison.wind_from)
+            aside, left = seen.without_what_turns(wind_from)
+            if left < seen.left_by(*window_of(comparison, holds)):
+                seen, holds = aside, _uneven_span(comparison, aside)
         told = seen.displacements(*window_of(comparison, holds)).tolist()
         uneven = suggested("encoder_slot_error", rotor.name, **slot_values(told))
         out.append(replace(uneven, interval=holds))

@@ -71,11 +71,14 @@ WITH_SPEED = 14.0
 WITH_SPEED_SHARE = 0.02
 WITH_SPEED_EXACT_SHARE = 0.005
 WITH_SPEED_FORM = 0.4
+WITH_SPEED_FADING = 5.0
 """An effect has one size in weak wind and in strong wind, which blows within so many seconds: a
 size that grows or shrinks with the speed must not drop the cost by more than the second, or than
 this share of the gain: the third, where the form is certain the fourth, and where a size is known
-to err by its form so many times that error. A fin that gives way is taken for a
-heavy vane otherwise, a cable that pulls for a disc off centre."""
+to err by its form so many times that error. The last is the most for what fades: its law is all
+that tells it from others (true imbalances have dropped it by up to 1.5, those that were cables or
+discs off centre by 5.3 to 15). A fin that gives way is taken for a heavy vane otherwise, a cable
+that pulls for a disc off centre."""
 
 DISCORD = 10.0
 DISCORD_SHARE = 0.02
@@ -418,16 +421,23 @@ def goes_with_speed(naming: Naming, station: Station) -> bool:
     of the speed differ from bearing to bearing, nor of delays: the wind's way to the reference is
     one.
     """
-    for term in naming.fit.terms:
-        effect = term.effect
-        own_law = (
-            effect.own_law or effect.noisy or effect.occasional or effect.entrance == "clock"
-        )
-        if own_law or effect.legible or term.is_told:
-            continue
-        share = max(WITH_SPEED_SHARE, WITH_SPEED_FORM * effect.form_error)
-        if effect.exact:
-            share = WITH_SPEED_EXACT_SHARE
-        if dependence_on_speed(naming, station, term) > max(WITH_SPEED, share * naming.gain):
-            return True
-    return False
+    return any(
+        dependence_on_speed(naming, station, term) > _most_with_speed(term, naming.gain)
+        for term in naming.fit.terms
+        if _is_asked_about_speed(term)
+    )
+
+
+def _is_asked_about_speed(term: Term) -> bool:
+    effect = term.effect
+    own_law = effect.own_law or effect.noisy or effect.occasional or effect.entrance == "clock"
+    return effect.fades or not (own_law or effect.legible or term.is_told)
+
+
+def _most_with_speed(term: Term, gain: float) -> float:
+    """How much a size that goes with the speed may drop the cost."""
+    effect = term.effect
+    if effect.fades:
+        return WITH_SPEED_FADING
+    share = max(WITH_SPEED_SHARE, WITH_SPEED_FORM * effect.form_error)
+    return max(WITH_SPEED, (WITH_SPEED_EXACT_SHARE if effect.exact else share) * gain)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -401,6 +401,13 @@ def _slot_statistics(
     return out
 
 
+CUPS = 3
+"""So many times per turn, and less often, cups pull more and less."""
+
+HARDLY_TURNS = 0.002
+"""In a wind whose direction varies by no more than this [rad^2] nothing tells what is locked to
+it."""
+
 FEWEST_IN_A_PART = 3
 """A part of the record with fewer intervals for each slot does not tell how uneven they are."""
 
@@ -444,6 +451,47 @@ class SlotIntervals:
                 there = self.means(slice(i, j))
                 shown[k] = float(there @ pattern) / max(float(pattern @ pattern), 1e-12)
         return shown
+
+    def left_by(self, begin: float, end: float) -> float:
+        """Sum of squares that slots uneven for a part of the record leave.
+
+        Args:
+            begin, end: Of the part [s].
+        """
+        first, last = np.searchsorted(self.begin, (begin, end))
+        number = np.bincount(self.slot[first:last], minlength=self.slots)
+        told = self.means(slice(first, last))
+        return float(self.deviation @ self.deviation - number @ told**2)
+
+    def without_what_turns(self, wind_from: FloatArray) -> tuple[SlotIntervals, float]:
+        """Without what is locked to the wind's direction: what cups do to the rate in each turn.
+
+        Slots keep their places on the disc, cups pull by where they are in the wind. The two are
+        told apart as far as the wind turns.
+
+        Args:
+            wind_from: Direction it comes from at the beginning of each interval [rad], counted as
+                the rotor turns, shape (m,).
+
+        Returns:
+            The intervals; and the sum of squares that uneven slots and this together leave.
+        """
+        angle = 2.0 * np.pi / self.slots * self.slot - wind_from
+        orders = np.arange(1, min(CUPS, (self.slots - 1) // 2) + 1)
+        waves = np.exp(1j * np.outer(orders, angle))
+        locked = np.concatenate((waves.real, waves.imag))
+        moving = np.array([wave - self._fixed(wave) for wave in locked])
+        own = self.deviation - self._fixed(self.deviation)
+        square = moving @ moving.T + HARDLY_TURNS * own.size * np.eye(len(moving))
+        size = np.linalg.solve(square, moving @ own)
+        left = own - size @ moving
+        return replace(self, deviation=self.deviation - size @ locked), float(left @ left)
+
+    def _fixed(self, values: FloatArray) -> FloatArray:
+        """Of values of each interval what is the same at each slot in every turn."""
+        number = np.maximum(np.bincount(self.slot, minlength=self.slots), 1)
+        means = np.bincount(self.slot, values, self.slots) / number
+        return np.asarray(means[self.slot])
 
     def displacements(self, begin: float, end: float) -> FloatArray:
         """How far each slot lies from its place in a part of the record, in slot widths.
