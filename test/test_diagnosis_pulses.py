@@ -156,6 +156,12 @@ def test_what_is_locked_to_a_wind_that_turns_is_not_the_disc(since: float) -> No
     assert (left > even.left_by(since, end)) is (since > 0.0)
 
 
+def test_fewer_edges_than_a_turn_has_tell_nothing_of_slots() -> None:
+    seen = slot_intervals(np.linspace(0.0, 50.0, 100), 120)
+    aside, left = seen.without_what_turns(np.zeros(seen.begin.size))
+    assert (aside.begin.size, left, seen.left_by(0.0, 50.0)) == (0, 0.0, 0.0)
+
+
 def test_the_place_of_each_slot_is_read_off_the_pulses() -> None:
     displaced = np.clip(0.15 * np.random.default_rng(5).standard_normal(SLOTS), -0.3, 0.3)
     displaced -= np.mean(displaced)

@@ -142,6 +142,25 @@ def test_the_inverse_vane_equation_gives_the_direction_back(cable: dict[str, flo
     assert found == pytest.approx(0.8, abs=1e-9)
 
 
+@pytest.mark.parametrize("method", ["kalman", "inverse"])
+def test_the_pull_of_a_cable_that_is_known_is_undone(method: str) -> None:
+    wound = {"cable_speed": 1.5, "cable_rest_deg": 150.0}
+    recording = blown(mast(vane=wound), speed=5.0, duration=90.0)
+    turned = {}
+    for known in (wound, {}):
+        found = process(
+            replace(recording, station=mast(vane=known)),
+            EstimatorSettings(method=method, window=90.0),
+        )
+        inner = (found.time > recording.start + 20e9) & (found.time < recording.stop - 5e9)
+        true = truth_at(recording, found.time)[inner].mean(axis=0)
+        seen = found.velocity[inner].mean(axis=0)
+        across = seen[1] * true[0] - seen[0] * true[1]
+        turned[len(known)] = abs(np.degrees(np.arctan2(across, seen[:2] @ true[:2])))
+    assert turned[0] > 5.0
+    assert turned[2] < 0.5
+
+
 def test_the_local_parabola_is_exact_for_a_parabola() -> None:
     time = np.sort(np.random.default_rng(1).integers(0, 2_000_000_000, 80))
     x = (time - 900_000_000) * 1e-9

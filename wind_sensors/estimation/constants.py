@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.forward import CUP, FIXED_AXIS, ON_VANE, Instruments
+from wind_sensors.instruments.dynamics.vane import VaneParameters
 from wind_sensors.motion import rotations
 from wind_sensors.station.model import Bivane, Cup, Instrument, Propeller, Rotor, Station, Vane
 from wind_sensors.station.parameters import rotor_parameters, vane_parameters
@@ -132,7 +133,9 @@ def instruments_of(station: Station) -> Instruments:
         rotor=rotor_rows,
         response=tables,
         mounting=mounting,
-        vane=np.array([list(vane_parameters(a.instrument)) for a in axes]).reshape(len(axes), 12),
+        vane=np.array([list(vane_parameters(a.instrument)) for a in axes]).reshape(
+            len(axes), len(VaneParameters._fields)
+        ),
         vane_density=np.array([a.instrument.reference_density for a in axes], dtype=np.float64),
         azimuth=np.array([a.azimuth for a in axes], dtype=np.int64),
         shadow=shadow,

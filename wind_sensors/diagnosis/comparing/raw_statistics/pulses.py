@@ -482,7 +482,7 @@ class SlotIntervals:
         locked = np.concatenate((waves.real, waves.imag))
         moving = np.array([wave - self._fixed(wave) for wave in locked])
         own = self.deviation - self._fixed(self.deviation)
-        square = moving @ moving.T + HARDLY_TURNS * own.size * np.eye(len(moving))
+        square = moving @ moving.T + HARDLY_TURNS * max(own.size, 1) * np.eye(len(moving))
         size = np.linalg.solve(square, moving @ own)
         left = own - size @ moving
         return replace(self, deviation=self.deviation - size @ locked), float(left @ left)
