@@ -135,7 +135,7 @@ def corrected(
     """What was found, `station_corrected.yaml`, and the found physics on the station's own file."""
     files = [stem.with_suffix(ending) for ending in (".txt", ".yaml", ".own.yaml")]
     if again or not all(f.exists() for f in files):
-        diagnosis = diagnose(recording, baseline, with_proof=False)
+        diagnosis = diagnose(recording, baseline)
         terms = diagnosis.naming.fit.terms if diagnosis.findings else ()
         names = " + ".join(t.effect.name for t in terms)
         files[0].write_text(f"{diagnosis.verdict}: {names or 'nothing'}", encoding="utf-8")
