@@ -20,8 +20,8 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
     bursts_of_bounces,
     chance_of_intervals,
     interval_statistics,
-    slot_intervals,
 )
+from wind_sensors.diagnosis.comparing.raw_statistics.slots import slot_intervals
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     ERRATIC,
     STILLNESS,

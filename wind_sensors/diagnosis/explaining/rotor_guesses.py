@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import BANDS
-from wind_sensors.diagnosis.comparing.raw_statistics.pulses import SlotIntervals, slot_intervals
+from wind_sensors.diagnosis.comparing.raw_statistics.slots import SlotIntervals, slot_intervals
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
 from wind_sensors.diagnosis.explaining.ruled_out import comes_sooner
