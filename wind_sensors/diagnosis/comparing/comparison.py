@@ -17,11 +17,12 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.moving import Moving
-from wind_sensors.diagnosis.comparing.observation import Channel
+from wind_sensors.diagnosis.comparing.observation import Channel, where_untold
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated, View
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import standing_share
 from wind_sensors.diagnosis.comparing.reference_place import Place, delayed
 from wind_sensors.diagnosis.comparing.turning import where_vanes_follow
+from wind_sensors.diagnosis.comparing.untold import as_known_elsewhere
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import Drive
@@ -117,7 +118,21 @@ class Comparison(View):
     def measuring(self) -> Comparison:
         """The same comparison with what is seen of the recording."""
         pulses, angles = self.recording.pulses, self.recording.angles
-        return replace(self, measured=self.observe(pulses, angles, self.debounced))
+        measured = self.observe(pulses, angles, self.debounced)
+        series, cosine = dict(measured.series), dict(measured.cosine)
+        for channel in self.channels:
+            if channel.kind == "vane_angle":
+                untold = where_untold(angles[channel.instrument], self.grid)
+                if untold.any():
+                    name = channel.name
+                    motion = self._expected_by_motion(channel.instrument)
+                    eddies = self.expected[name] * self.speed - motion
+                    seen = series[name] - motion
+                    seen = as_known_elsewhere(seen, eddies, untold, self.grid.dt)
+                    series[name] = seen + motion
+                    full = spectra.to_cosine(self.masked(series[name]))
+                    cosine[name] = full[: self.coefficients]
+        return replace(self, measured=replace(measured, series=series, cosine=cosine))
 
     @cached_property
     def standing_shares(self) -> Mapping[str, float]:
@@ -281,6 +296,12 @@ class Comparison(View):
         )
         (name,) = seen.series
         return replace(seen, by_motion={name: series}, by_motion_cosine={name: cosine})
+
+    def _expected_by_motion(self, instrument: str) -> FloatArray:
+        """What the mount's motion is expected to make of an instrument's series, shape (n,)."""
+        if self.moving is None:
+            return np.zeros(self.grid.n)
+        return self._by_motion(self.moving.station, instrument, self.moving)[0]
 
     def _by_motion(
         self, station: Station, instrument: str, moving: Moving

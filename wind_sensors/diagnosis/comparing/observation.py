@@ -17,6 +17,7 @@ from wind_sensors.station.model import Angle, Cup, Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 TimeArray = npt.NDArray[np.int64]
 
 UNHEARD = 1.0
@@ -233,11 +234,23 @@ def angle_series(
         return np.zeros(grid.n)
     mean = np.arctan2(s, c)
     if expected is not None and loose.any():
-        unknown = np.zeros(grid.n, dtype=np.bool_)
-        unknown[place[loose & (place >= 0) & (place < grid.n)]] = True
-        unknown &= ~filled
+        unknown = where_untold(angles, grid)
         mean[unknown] = expected[unknown]
         filled |= unknown
     if not filled.all():
         mean = np.interp(np.arange(grid.n), np.flatnonzero(filled), mean[filled])
     return np.asarray(mean, dtype=np.float64)
+
+
+def where_untold(angles: Angles, grid: Grid) -> BoolArray:
+    """Bins in which every reading jumps about, shape (n,): no direction is told there."""
+    loose = angles.erratic
+    if not loose.any():
+        return np.zeros(grid.n, dtype=np.bool_)
+    place = np.floor(grid.seconds(angles.time) / grid.dt).astype(np.intp)
+    inside = (place >= 0) & (place < grid.n)
+    told = inside & np.isfinite(angles.angle) & ~loose
+    without, with_direction = (
+        np.bincount(place[which], minlength=grid.n) > 0 for which in (inside & loose, told)
+    )
+    return without & ~with_direction
