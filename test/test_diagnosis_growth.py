@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,11 +14,11 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.search import searcher_of
-from wind_sensors.diagnosis.explaining.terms import Term
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Change, Station
 
-FULL = {"gain": 0.9, "inertia_factor": 2.5}
+FULL = {"gain": 0.9, "inertia_factor": 2.5, "friction_speed": 0.0}
 
 
 def iced(growth: float, interval: tuple[float, float | None] | None = None) -> Station:
@@ -86,6 +87,26 @@ def test_ice_that_grows_is_told_with_its_time() -> None:
     assert finding.parameters["growth_time"].value == pytest.approx(constant, rel=0.5)
 
 
+def test_ice_that_brakes_the_bearing_is_one_effect() -> None:
+    values = {**FULL, "growth_time": 80.0, "friction_speed": 1.2}
+    iced_bearing = with_effect(STATION, catalogue()["icing"], "cup", values)
+    found = diagnose(recorded(iced_bearing, 56), baseline())
+    (finding,) = found.findings
+    assert finding.term.key == ("icing", "cup")
+    friction = finding.parameters["friction_speed"]
+    assert friction.low < 1.2 < friction.high and friction.low > 0.0
+
+
+def test_what_begins_may_grow_from_there_or_from_before_the_record() -> None:
+    begins = Term(catalogue()["icing"], "cup", {**FULL, "growth_time": 0.0}, (95.0, None))
+    from_there, from_before = begins.growing
+    assert from_there.interval == (95.0, None) and from_there.grows
+    assert from_before.interval == ALWAYS and from_before.grows
+    assert from_there.growing == () == replace(begins, interval=ALWAYS).growing
+    offset = Term(catalogue()["calibration_offset"], "cup", {"offset": -1.0}, (95.0, None))
+    assert offset.growing == ()
+
+
 def test_ice_makes_no_rotor_lighter() -> None:
     """A lighter rotor would follow an offset more closely."""
     offset = catalogue()["calibration_offset"]
@@ -97,6 +118,6 @@ def test_ice_makes_no_rotor_lighter() -> None:
         return fit(null, STATION, [Term(catalogue()[effect], "cup", values)], None)
 
     true = fitted("calibration_offset", offset=-1.0)
-    ice = fitted("icing", gain=0.93, inertia_factor=1.2, growth_time=0.0)
+    ice = fitted("icing", gain=0.93, inertia_factor=1.2, growth_time=0.0, friction_speed=0.0)
     assert ice.terms[0].values["inertia_factor"] >= 1.0
     assert ice.cost > true.cost + 12.0

@@ -25,8 +25,8 @@ from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.verdict import diagnose
 
-ICE = {"growth_time": 0.0}
-"""That is there at once."""
+ICE = {"growth_time": 0.0, "friction_speed": 0.0}
+"""That is there at once, and brakes nothing."""
 
 
 @settings(max_examples=50, deadline=None)

@@ -269,16 +269,17 @@ def _icing(entry: Entry, values: Values) -> dict[str, Any]:
     return {
         "calibration_gain": entry.calibration_gain * values["gain"],
         "inertia_factor": entry.inertia_factor * values["inertia_factor"],
+        "friction_speed": (entry.friction_speed**2 + values.get("friction_speed", 0.0) ** 2) ** 0.5,
     }
 
 
 ICING = Effect(
     name="icing",
     meaning="Ice (above freezing dirt, salt or insects) makes the rotor heavier and its cups or "
-    "blades worse, at the same time; it may grow.",
+    "blades worse, at the same time, and may brake its bearing; it may grow.",
     entrance="response",
-    equation="l S = gain * U - U0 and l0 = factor * l0_cal together; each approaches its size "
-    "as 1 - exp(-t / growth time)",
+    equation="l S = gain * U - U0 and l0 = factor * l0_cal together, beside a bearing that brakes "
+    "by U_s^2; each approaches its size as 1 - exp(-t / growth time)",
     source="K94, eq. (6)",
     region="near and below 0 deg C; all speeds and high frequencies",
     contains=frozenset({"calibration_drift", "rotor_inertia"}),
@@ -292,11 +293,12 @@ ICING = Effect(
             starts=(1.5, 3.0),
         ),
         Parameter("growth_time", "s", 0.0, 600.0, step=10.0, starts=(100.0,), spare=True),
+        Parameter("friction_speed", "m/s", 0.0, 3.0, step=0.1, starts=(0.5,), spare=True),
     ),
     applies=_is_rotor,
     update=_icing,
     grows="growth_time",
-    templates=({"gain": 0.97, "inertia_factor": 1.3, "growth_time": 0.0},),
+    templates=({"gain": 0.97, "inertia_factor": 1.3, "growth_time": 0.0, "friction_speed": 0.0},),
     confusable={
         "calibration_drift": "temperature; look at the cups",
         "bearing_friction": "temperature; a run-down test by hand",

@@ -85,9 +85,10 @@ def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
 
 
 def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
-    """The terms with one parameter larger or smaller."""
-    found = []
+    """The terms with one parameter larger or smaller, or growing."""
+    found: list[tuple[Term, ...]] = []
     for k, term in enumerate(terms):
+        found.extend((*terms[:k], grown, *terms[k + 1 :]) for grown in term.growing)
         for parameter in term.effect.parameters:
             healthy, value = parameter.healthy, term.values[parameter.name]
             if healthy is None or value == healthy or not term.fits(parameter):

@@ -262,6 +262,13 @@ def _with_sharp_intervals(
     if sound and sound[0].evidence < sharp[0].evidence:
         # The interval is that of another effect so far.
         sound += judged(searcher, [sharper(sound[0])], named)
+    starts = [
+        [*one.fit.terms[:-1], grown]
+        for one in (*sharp, *sound)
+        for grown in one.fit.terms[-1].growing
+    ]
+    growing = [f for f in searcher.refit_all(null, starts) if plausible(f)]
+    sound += judged(searcher, growing, named)
     return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
 
 

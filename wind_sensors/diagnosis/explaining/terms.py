@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import Simulated
@@ -42,6 +42,18 @@ class Term:
     def grows(self) -> bool:
         """Whether it approaches its size while it holds."""
         return self.effect.growth(self.values) > 0.0
+
+    @property
+    def growing(self) -> tuple[Term, ...]:
+        """The same, growing, where it is taken to begin at its full size: from there, or always."""
+        if self.grows or not self.effect.grows or self.interval == ALWAYS:
+            return ()
+        (parameter,) = (p for p in self.effect.parameters if p.name == self.effect.grows)
+        return tuple(
+            replace(self, values={**self.values, parameter.name: time}, interval=interval)
+            for time in parameter.starts
+            for interval in (self.interval, ALWAYS)
+        )
 
     @property
     def relative_size(self) -> float:
