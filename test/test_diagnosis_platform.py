@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from wind_sensors.diagnosis.comparing.observation import where_untold
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
@@ -92,6 +93,25 @@ def on_waves(seed: int, eddies: float, higher: float = 0.0) -> Recording:
     wind = isotropic_spec(8.0, eddies, 60.0, seed=seed)
     scenario = Scenario(wind, duration=600.0, seed=seed, trajectory=boat(seed=5))
     return replace(simulate(sailing, scenario), station=usv())
+
+
+def test_waves_stay_in_full_where_a_vane_tells_nothing() -> None:
+    """What is put in falls with the frequency as the eddies' likeness does; the waves do not."""
+    sailed, elsewhere = on_waves(1, 0.06), on_waves(2, 0.06)
+    (vane,) = sailed.angles
+    readings = sailed.angles[vane]
+    seconds = (readings.time - readings.time[0]) * 1e-9
+    floats = seconds % 12.0 < 5.0
+    chance = np.random.default_rng(7).uniform(-np.pi, np.pi, seconds.size)
+    broken = replace(readings, angle=np.where(floats, chance, readings.angle))
+    recording = replace(sailed, reference=elsewhere.reference, angles={vane: broken})
+    comparison = prepare(recording)
+    name = f"{vane}/vane_angle"
+    untold = where_untold(comparison.recording.angles[vane], comparison.grid)
+    waves = prepare(on_waves(3, 1e-3)).measured.series[name]
+    assert 0.3 < np.mean(untold) < 0.6
+    slope, _ = np.polyfit(waves[untold], comparison.measured.series[name][untold], 1)
+    assert slope == pytest.approx(1.0, abs=0.15)
 
 
 def test_waves_are_expected_in_full_where_the_references_eddies_are_not() -> None:

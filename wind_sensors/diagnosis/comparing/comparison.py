@@ -119,20 +119,27 @@ class Comparison(View):
         """The same comparison with what is seen of the recording."""
         pulses, angles = self.recording.pulses, self.recording.angles
         measured = self.observe(pulses, angles, self.debounced)
-        series, cosine = dict(measured.series), dict(measured.cosine)
         for channel in self.channels:
             if channel.kind == "vane_angle":
-                untold = where_untold(angles[channel.instrument], self.grid)
-                if untold.any():
-                    name = channel.name
-                    motion = self._expected_by_motion(channel.instrument)
-                    eddies = self.expected[name] * self.speed - motion
-                    seen = series[name] - motion
-                    seen = as_known_elsewhere(seen, eddies, untold, self.grid.dt)
-                    series[name] = seen + motion
-                    full = spectra.to_cosine(self.masked(series[name]))
-                    cosine[name] = full[: self.coefficients]
-        return replace(self, measured=replace(measured, series=series, cosine=cosine))
+                measured = self._completed(measured, channel)
+        return replace(self, measured=measured)
+
+    def _completed(self, measured: Simulated, channel: Channel) -> Simulated:
+        """What is seen of a recording, with a vane's series where its readings tell nothing."""
+        name, instrument = channel.name, channel.instrument
+        untold = where_untold(self.recording.angles[instrument], self.grid)
+        if not untold.any():
+            return measured
+        motion = self._expected_by_motion(instrument)
+        eddies = self.expected[name] * self.speed - motion
+        seen = measured.series[name] - motion
+        series = as_known_elsewhere(seen, eddies, untold, self.grid.dt) + motion
+        cosine = spectra.to_cosine(self.masked(series))[: self.coefficients]
+        return replace(
+            measured,
+            series={**measured.series, name: series},
+            cosine={**measured.cosine, name: cosine},
+        )
 
     @cached_property
     def standing_shares(self) -> Mapping[str, float]:

@@ -231,7 +231,7 @@ def _where_they_calm(
 def _with_sharp_intervals(
     searcher: Searcher, null: Whitener, ranked: Sequence[Judged], named: Fit | None
 ) -> list[Judged]:
-    """The same explanations with beginnings and ends where they fit best; best first.
+    """The same explanations with beginnings and ends where they fit best, or growing; best first.
 
     Args:
         searcher: The search.
@@ -262,13 +262,8 @@ def _with_sharp_intervals(
     if sound and sound[0].evidence < sharp[0].evidence:
         # The interval is that of another effect so far.
         sound += judged(searcher, [sharper(sound[0])], named)
-    starts = [
-        [*one.fit.terms[:-1], grown]
-        for one in (*sharp, *sound)
-        for grown in one.fit.terms[-1].growing
-    ]
-    growing = [f for f in searcher.refit_all(null, starts) if plausible(f)]
-    sound += judged(searcher, growing, named)
+    growing = searcher.refit_all(null, _growing([*sharp, *sound]))
+    sound += judged(searcher, [f for f in growing if plausible(f)], named)
     return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
 
 
@@ -361,3 +356,10 @@ def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
             values = {**effect.templates[0], **shared}
             found[key] = [*others, replace(last, effect=effect, values=values)]
     return list(found.values())
+
+
+def _growing(passing: Sequence[Judged]) -> list[list[Term]]:
+    """Explanations whose last effect grows where it was taken to begin at its full size."""
+    return [
+        [*one.fit.terms[:-1], grown] for one in passing for grown in one.fit.terms[-1].growing
+    ]
