@@ -1,4 +1,4 @@
-"""Command line of the world, for colleagues: single recordings and the development set."""
+"""Command line of the world, for colleagues: single recordings (sets: `wind prove seal`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from proving_ground.concealed.strangers import STRANGERS
-from proving_ground.development_set import write_set
 from proving_ground.generate import (
     generate_recording,
     healthy,
@@ -30,14 +29,7 @@ def main() -> int:
     one.add_argument("--size", type=float, default=3.0, help="multiples of the minimum size")
     one.add_argument("--healthy", action="store_true")
     one.add_argument("-o", "--output", type=Path, required=True)
-    many = commands.add_parser("devset", help="write the development set")
-    many.add_argument("--minutes", type=float, default=10.0)
-    many.add_argument("--kinds", default="ABC")
-    many.add_argument("-o", "--output", type=Path, required=True)
     arguments = parser.parse_args()
-    if arguments.command == "devset":
-        write_set(arguments.output, arguments.kinds, minutes=arguments.minutes)
-        return 0
     if arguments.healthy == bool(arguments.effect):
         parser.error("say either --healthy or --effect NAME")
     station = random_station(arguments.kind, arguments.station)

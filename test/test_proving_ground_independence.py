@@ -58,7 +58,7 @@ def test_the_world_runs_without_loading_the_product_s_physics() -> None:
     import sys
 
     program = (
-        "import sys, proving_ground.generate, proving_ground.development_set\n"
+        "import sys, proving_ground.generate, proving_ground.sealing.seal\n"
         "print([m for m in sys.modules if m.startswith('wind_sensors.')])"
     )
     run = subprocess.run(

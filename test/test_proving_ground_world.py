@@ -13,7 +13,6 @@ from proving_ground.concealed.kinds import activity_between
 from proving_ground.concealed.registry import CATALOGUED, cause
 from proving_ground.concealed.rotor import drag_for_loss
 from proving_ground.concealed.strangers import STRANGERS
-from proving_ground.development_set import station_plan
 from proving_ground.drive import SUBSTEPS, turn_vane
 from proving_ground.generate import Planted, generate_recording, healthy, with_effect
 from proving_ground.inflow import Array, make_eddies
@@ -283,9 +282,3 @@ def test_what_happens_within_a_turn_is_left_out_where_a_turn_has_too_few_pulses(
     assert "encoder_slot_error" not in applicable("A", 1)
     assert "encoder_slot_error" in applicable("A", 10)
     assert "lever_arm" not in applicable("A", 10)
-
-
-def test_the_development_plan_names_each_recording_once_and_shares_no_weather() -> None:
-    plan = list(station_plan("A", 1, 10.0))
-    assert len({named.name for named in plan}) == len(plan)
-    assert len({named.spec.seed for named in plan}) == len(plan)

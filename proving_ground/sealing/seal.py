@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import secrets
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from rich.progress import track
 
 from proving_ground.generate import RecordingSpec, generate_recording
+from proving_ground.sealing.chosen import chosen_plan
 from proving_ground.sealing.cipher import commitment, derive, encrypt
 from proving_ground.sealing.strata import Plan, make_plan
 from wind_sensors.errors import UserError
@@ -42,14 +44,16 @@ def seal(
     healthy_count: int = 6,
     kinds: str = "ABC",
     strata: dict[str, int] | None = None,
+    causes: Sequence[str] = (),
     jobs: int = 1,
 ) -> Sealed:
-    """Draw, write and seal a set.
+    """Draw, write and seal a set: of `total` cases, of given strata, or of causes one chose
+    (see `parse_causes`).
 
     The weather and what is concealed follow from `seed` and the secret `key` together, so that
     the seed alone gives nothing away and the key alone lets anyone make the set again.
 
-    Raises UserError if the folder exists already.
+    Raises UserError if the folder exists already, or if a chosen cause cannot be read.
     """
     if folder.exists():
         raise UserError("the folder exists already", str(folder), "Give another one with -o.")
@@ -60,6 +64,7 @@ def seal(
         "healthy_count": healthy_count,
         "kinds": kinds,
         "strata": strata,
+        "causes": list(causes),
     }
     plan, names = draw(key, drawing)
     answers = _write(folder, plan, names, jobs)
@@ -84,13 +89,12 @@ def draw(key: bytes, drawing: dict[str, Any]) -> tuple[Plan, list[str]]:
     """The plan of a set and the names of its recordings, from the secret and how it was drawn."""
     seed = int(drawing["seed"])
     rng = np.random.default_rng(int.from_bytes(derive(key, f"plan {seed}"), "big"))
+    minutes, healthy_count = float(drawing["minutes"]), int(drawing["healthy_count"])
+    kinds = str(drawing["kinds"])
+    if drawing.get("causes"):
+        return chosen_plan(drawing["causes"], rng, minutes, healthy_count, kinds)
     plan = make_plan(
-        int(drawing["total"]),
-        rng,
-        float(drawing["minutes"]),
-        int(drawing["healthy_count"]),
-        str(drawing["kinds"]),
-        drawing["strata"],
+        int(drawing["total"]), rng, minutes, healthy_count, kinds, drawing["strata"]
     )
     return plan, _names(len(plan.cases), key, seed)
 

@@ -31,6 +31,14 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     seal.add_argument("--minutes", type=float, default=15.0, help="length of a recording")
     seal.add_argument("--healthy", type=_positive, default=6, help="healthy ones for each station")
     seal.add_argument("--kinds", default="ABC", help="station kinds: A mast, B boat, C propeller")
+    seal.add_argument(
+        "--cause",
+        action="append",
+        default=[],
+        metavar="EFFECT:SIZE[@BEGIN[-END]]",
+        help="conceal this on each kind of station instead of drawing; several joined by +; "
+        "repeatable (the names of such recordings tell what is in them)",
+    )
     seal.add_argument("--jobs", type=_positive, default=1)
 
     trial = steps.add_parser("run", help="diagnose each recording where the answers cannot be read")
@@ -128,6 +136,7 @@ def _seal(arguments: argparse.Namespace) -> int:
         minutes=arguments.minutes,
         healthy_count=arguments.healthy,
         kinds=arguments.kinds,
+        causes=arguments.cause,
         jobs=arguments.jobs,
     )
     print(f"sealed {sealed.recordings} recordings in {sealed.folder}")
