@@ -57,7 +57,7 @@ def with_readings(recording: Recording, angle: np.ndarray) -> Recording:
     return replace(recording, angles={**recording.angles, "vane": told})
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 1000), st.floats(-0.3, 0.3), st.floats(0.05, 0.3), st.floats(-3.1, 3.1))
 def test_a_number_to_which_a_vane_returns_is_told(
     seed: int, centre: float, width: float, number: float

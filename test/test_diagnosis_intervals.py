@@ -20,7 +20,7 @@ CELLS = 7
 LENGTH = 40
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 10_000), number=st.integers(1, 4))
 def test_gains_are_those_of_least_squares(seed: int, number: int) -> None:
     rng = np.random.default_rng(seed)

@@ -28,7 +28,7 @@ def stamps(seed: int, every: float = 0.05, seconds: float = 390.0) -> FloatArray
     return np.asarray(even + 0.1 * every * rng.uniform(-1.0, 1.0, even.size))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**16),
     late=st.floats(0.3, 3.0),

@@ -96,7 +96,7 @@ def test_certificates_know_no_level() -> None:
     assert excess_of(comparison, simulated, certificates).score == -np.inf
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(2, 12), st.floats(0.3, 1.5), st.integers(0, 2**32 - 1))
 def test_a_few_healthy_days_do_not_make_another_one_loud(
     days: int, scatter: float, seed: int

@@ -39,7 +39,7 @@ def _readings(angle: np.ndarray) -> Angles:
     return Angles(np.arange(angle.size, dtype=np.int64) * (SECOND // 20), angle)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(0.05, 0.9), st.floats(1.0, 9.0))
 def test_a_steady_rotor_turns_evenly_to_both_ends(phase: float, rate: float) -> None:
     cup = STATION.instrument("cup")
@@ -53,7 +53,7 @@ def test_a_steady_rotor_turns_evenly_to_both_ends(phase: float, rate: float) -> 
 
 
 @given(seed=st.integers(0, 2**31), slots=st.integers(1, 40))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_edges_are_a_slot_apart_unless_they_say_otherwise(seed: int, slots: int) -> None:
     rng = np.random.default_rng(seed)
     time = np.cumsum(rng.integers(10_000_000, 90_000_000, 500))

@@ -29,7 +29,7 @@ ICE = {"growth_time": 0.0, "friction_speed": 0.0}
 """That is there at once, and brakes nothing."""
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 10_000), several=st.integers(1, 3))
 def test_a_promise_is_the_drop_of_the_sum_of_squares(seed: int, several: int) -> None:
     rng = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""What pulses and readings tell by themselves: slots, dead times, and what they rule out."""
+"""What pulses tell by themselves: dead times, bounces, losses, and what they rule out."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from diagnosis_cases import STATION, baseline, recorded
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from turned_disc import SLOTS, edges
 
 from wind_sensors.diagnosis.comparing.observation import Grid
 from wind_sensors.diagnosis.comparing.observing import BANDS
@@ -21,16 +22,8 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
     chance_of_intervals,
     interval_statistics,
 )
-from wind_sensors.diagnosis.comparing.raw_statistics.slots import slot_intervals
-from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
-    ERRATIC,
-    STILLNESS,
-    chance_of_stillness,
-    stillness_statistics,
-)
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
-from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.acceptance import inexactness, only_makes_good, overlap
 from wind_sensors.diagnosis.explaining.bounds import run_away, without_run_aways
 from wind_sensors.diagnosis.explaining.fitting import fit
@@ -38,8 +31,6 @@ from wind_sensors.diagnosis.explaining.guesses import guesses_of
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
-from wind_sensors.diagnosis.explaining.vane_guesses import hole_between
-from wind_sensors.diagnosis.healthy.whitening import trust_of
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Pulses
@@ -47,51 +38,6 @@ from wind_sensors.station.signals import Pulses
 FloatArray = npt.NDArray[np.float64]
 
 LOST_BY_CHANCE = {"dead_time": 0.0, "loss_probability": 0.2, "loss_growth": 0.0}
-SLOTS = 10
-TURNS = 900
-TURN = 0.4
-
-
-def edges(displaced: FloatArray, since: float = 0.0) -> FloatArray:
-    """Edges [s] of a disc that turns every 0.4 s, a little faster and slower, slots displaced [1]
-    from some time on."""
-    place = np.arange(SLOTS * TURNS)
-    even = place / SLOTS * TURN
-    time = even + 0.05 * np.sin(even / 7.0)
-    moved = displaced[place % SLOTS] * TURN / SLOTS
-    return np.asarray(time + np.where(time > since, moved, 0.0))
-
-
-def unevenness(time: FloatArray) -> tuple[float, float]:
-    """Scatter of the slots and what swings once per turn."""
-    grid = Grid(0, 0.1, round(TURNS * TURN / 0.1))
-    cup = STATION.instrument("cup").model_copy(update={"pulses_per_revolution": SLOTS})
-    assert isinstance(cup, Cup)
-    speed = np.full(grid.n, 2.0 * np.pi * cup.calibration_distance / TURN)
-    pulses = Pulses(np.round(time * 1e9).astype(np.int64))
-    found = interval_statistics(pulses, cup, np.zeros(grid.n), speed, grid)
-    return float(found[2]), float(found[3])
-
-
-@pytest.mark.parametrize(
-    ("lost", "bounced", "followed"),
-    [(0.02, 0.0, 0.9), (0.04, 0.0, 0.85), (0.0, 0.04, 0.95), (0.02, 0.02, 0.8)],
-)
-def test_slots_are_followed_past_lost_and_doubled_edges(
-    lost: float, bounced: float, followed: float
-) -> None:
-    records = 40
-    right = 0
-    for seed in range(records):
-        rng = np.random.default_rng(seed)
-        displaced = np.clip(0.06 * rng.standard_normal(SLOTS), -0.2, 0.2)
-        clean = edges(displaced)
-        kept = clean[rng.random(clean.size) >= lost]
-        again = kept[rng.random(kept.size) < bounced] + rng.uniform(0.0005, 0.003)
-        expected, found = unevenness(clean), unevenness(np.sort(np.concatenate((kept, again))))
-        # A wrong count anywhere spreads every slot over all of them, and next to nothing is left.
-        right += found == pytest.approx(expected, abs=0.15 * max(expected))
-    assert right >= followed * records
 
 
 @given(
@@ -125,73 +71,6 @@ def test_of_very_many_edges_some_tell_as_much_as_all() -> None:
     assert found[1][:3] == pytest.approx(found[0][:3], rel=0.05, abs=2e-4)
     assert found[0][1] > 0.001
     assert found[0][2] > 0.1
-
-
-def test_slots_that_become_uneven_show_from_then_on() -> None:
-    displaced = 0.05 * np.random.default_rng(3).standard_normal(SLOTS)
-    cuts = np.linspace(0.0, TURNS * TURN, 13)
-    shown = slot_intervals(edges(displaced, since=120.0), SLOTS).shown_in(cuts)
-    begin = np.flatnonzero(cuts[:-1] >= 120.0)
-    assert np.abs(shown[: begin[0] - 1]).max() < 0.1 * shown[begin].min()
-
-
-@pytest.mark.parametrize("since", [0.0, 120.0])
-def test_what_is_locked_to_a_wind_that_turns_is_not_the_disc(since: float) -> None:
-    """Cups that pull more in one direction of the wind, once and three times per turn."""
-    displaced = 0.03 * np.random.default_rng(3).standard_normal(SLOTS)
-    displaced -= np.mean(displaced)
-    time = edges(displaced, since)
-    wind_from = 0.8 * np.sin(time / 40.0) + 0.004 * time
-    angle = 2.0 * np.pi * np.arange(time.size) / SLOTS - wind_from
-    pulled = time + TURN / SLOTS * (0.04 * np.cos(angle) + 0.02 * np.cos(3.0 * angle + 0.5))
-    seen, even = (slot_intervals(t, SLOTS) for t in (pulled, time))
-    aside, left = seen.without_what_turns(np.interp(seen.begin, time, wind_from))
-    end = TURNS * TURN
-    if since == 0.0:
-        assert left < 0.1 * seen.left_by(0.0, end)
-        assert aside.displacements(0.0, end) == pytest.approx(displaced, abs=0.003)
-        assert np.abs(seen.displacements(0.0, end) - displaced).max() > 0.02
-    # Slots that become uneven while the wind turns remain slots.
-    _, left = even.without_what_turns(np.interp(even.begin, time, wind_from))
-    assert (left > even.left_by(since, end)) is (since > 0.0)
-
-
-def test_fewer_edges_than_a_turn_has_tell_nothing_of_slots() -> None:
-    seen = slot_intervals(np.linspace(0.0, 50.0, 100), 120)
-    aside, left = seen.without_what_turns(np.zeros(seen.begin.size))
-    assert (aside.begin.size, left, seen.left_by(0.0, 50.0)) == (0, 0.0, 0.0)
-
-
-def test_the_place_of_each_slot_is_read_off_the_pulses() -> None:
-    displaced = np.clip(0.15 * np.random.default_rng(5).standard_normal(SLOTS), -0.3, 0.3)
-    displaced -= np.mean(displaced)
-    seen = slot_intervals(edges(displaced, since=120.0), SLOTS)
-    assert seen.displacements(130.0, TURNS * TURN) == pytest.approx(displaced, abs=0.01)
-    assert np.abs(seen.displacements(0.0, 110.0)).max() < 0.01
-
-
-def test_a_disc_is_simulated_with_the_slots_that_its_pulses_show() -> None:
-    slots = catalogue()["encoder_slot_error"]
-    displaced = 0.1 * np.random.default_rng(6).standard_normal(12)
-    displaced -= np.mean(displaced)
-    cup = STATION.instrument("cup")
-    assert isinstance(cup, Cup)
-    values = slot_values(displaced.tolist())
-    corrected = with_effect(STATION, slots, "cup", values).instrument("cup")
-    assert isinstance(corrected, Cup)
-    assert corrected.electronics.slot_errors == pytest.approx(displaced)
-
-
-def test_the_beginning_of_uneven_slots_is_part_of_the_finding() -> None:
-    slots = {"scatter": 0.04, "once_per_turn": 0.03}
-    station = with_effect(
-        STATION, catalogue()["encoder_slot_error"], "cup", slots, (220.0, None)
-    )
-    (finding,) = diagnose(recorded(station, 81), baseline()).findings
-    assert finding.term.effect.name == "encoder_slot_error"
-    assert finding.term.interval[0] == pytest.approx(220.0, abs=20.0)
-    assert finding.term.interval[1] is None
-    assert finding.parameters["scatter"].value == pytest.approx(0.04, rel=0.2)
 
 
 DEAD = {"dead_time": 0.0075, "loss_probability": 0.0, "loss_growth": 0.0}
@@ -238,43 +117,6 @@ def test_only_a_counter_cuts_intervals_off(
     guesses = guesses_of(prepare(recorded(station, 83)), STATION)
     terms = guesses.get(("missed_pulses", "cup"), [])
     assert any(term.held for term in terms) is held
-
-
-def test_a_vane_that_reads_in_steps_has_no_gap_where_it_reads() -> None:
-    coarse = with_effect(
-        STATION, catalogue()["quantisation"], "vane", {"step": 6.0, "origin": 0.0}
-    )
-    gapped = {"centre": 190.0, "width": 40.0, "reading": 0.0, "form": 0.0}
-    gap = catalogue()["potentiometer_gap"]
-    real = prepare(recorded(with_effect(STATION, gap, "vane", gapped), 84))
-    stepped = prepare(recorded(coarse, 84))
-    term = Term(gap, "vane", gapped)
-    assert ruled_out(stepped, STATION, [term])
-    assert not ruled_out(real, STATION, [term])
-    assert not ruled_out(stepped, STATION, [Term(gap, "vane", {**gapped, "form": 2.0})])
-
-
-def test_readings_a_last_digit_off_whole_degrees_bound_the_hole_between_them() -> None:
-    lowest = np.nextafter(115.0, 0.0)
-    steps = np.array([lowest, 125.0, 135.0, 145.0, 155.0, 165.0, 175.0, -175.0])
-    found = hole_between(np.repeat(steps, [426, 4662, 3665, 2243, 3936, 2729, 337, 2]))
-    assert found is not None
-    centre, width = found
-    assert width == pytest.approx(10.0)
-    assert centre % 10.0 == pytest.approx(0.0, abs=1e-6) or centre % 10.0 > 9.999
-
-
-def test_the_gap_of_a_vane_that_counts_backwards_is_looked_for_on_its_other_side() -> None:
-    gap = Term(
-        catalogue()["potentiometer_gap"],
-        "vane",
-        {"centre": 190.0, "width": 40.0, "reading": 0.0, "form": 0.0},
-    )
-    swap = Term(catalogue()["sensor_swap"], "vane", {"reversed": 1.0})
-    only_swapped = prepare(recorded(swap.planted(STATION), 84))
-    both = prepare(recorded(planted(STATION, [swap, gap]), 84))
-    assert ruled_out(only_swapped, STATION, [swap, gap])
-    assert not ruled_out(both, STATION, [swap, gap])
 
 
 def test_what_the_recording_does_not_show_is_held_where_it_was() -> None:
@@ -324,16 +166,6 @@ def test_a_bearing_that_sticks_leaves_noise_of_its_own(breakaway: float, noisy: 
     assert Term(catalogue()["bearing_friction"], "cup", values).leaves_noise is noisy
 
 
-def test_slots_are_counted_anew_after_a_silence() -> None:
-    displaced = 0.05 * np.random.default_rng(5).standard_normal(SLOTS)
-    whole = edges(displaced)
-    # Of every record the disc goes on by another number of slots.
-    for lost in range(3 * SLOTS, 4 * SLOTS):
-        silent = (whole > 150.0) & (whole < 210.0)
-        silent[np.flatnonzero(silent)[-1] + 1 + np.arange(lost)] = True
-        assert unevenness(whole[~silent]) == pytest.approx(unevenness(whole), rel=0.1)
-
-
 @pytest.mark.parametrize(("begins", "ruled"), [(0.0, True), (200.0, False)])
 def test_a_counter_that_is_deaf_throughout_is_not_said_to_become_so(
     begins: float, ruled: bool
@@ -374,57 +206,6 @@ def test_pulses_that_come_soon_or_not_at_all_were_not_lost_one_by_one(
     assert not ruled_out(comparison, STATION, [seldom])
 
 
-@pytest.mark.parametrize(("width", "begins"), [(12.0, 0.0), (34.0, 0.0), (16.0, 250.0)])
-def test_readings_tell_where_a_gap_is_and_since_when(width: float, begins: float) -> None:
-    value = 190.0 - 0.5 * width
-    values = {"centre": 190.0, "width": width, "reading": value, "form": 1.0}
-    gap = catalogue()["potentiometer_gap"]
-    station = with_effect(STATION, gap, "vane", values, (begins, None))
-    comparison = prepare(recorded(station, 84, swing=0.8))
-    (told,) = (t for t in guesses_of(comparison, STATION)[("potentiometer_gap", "vane")] if t.held)
-    assert np.mod(told.values["centre"] - 190.0 + 180.0, 360.0) - 180.0 == pytest.approx(0, abs=0.2)
-    assert told.values["width"] == pytest.approx(width, abs=0.4)
-    assert np.mod(told.values["reading"] - value + 180.0, 360.0) == pytest.approx(180.0, abs=0.01)
-    assert told.interval[0] == pytest.approx(begins, abs=25.0)
-    assert told.interval[1] is None
-
-
-@pytest.mark.parametrize(("width", "begins"), [(12.0, 0.0), (34.0, 0.0), (16.0, 100.0)])
-def test_good_readings_tell_where_a_wiper_floats_and_since_when(
-    width: float, begins: float
-) -> None:
-    values = {"centre": 190.0, "width": width, "reading": 0.0, "form": 2.0}
-    gap = catalogue()["potentiometer_gap"]
-    station = with_effect(STATION, gap, "vane", values, (begins, None))
-    comparison = prepare(recorded(station, 84, swing=0.8))
-    (told,) = (t for t in guesses_of(comparison, STATION)[("potentiometer_gap", "vane")] if t.held)
-    assert told.values["form"] == 2.0
-    assert np.mod(told.values["centre"] - 190.0 + 180.0, 360.0) - 180.0 == pytest.approx(0, abs=0.6)
-    # Good readings beside a jump count as jumps.
-    assert told.values["width"] == pytest.approx(width + 0.7, abs=0.9)
-    assert told.interval[0] == pytest.approx(begins, abs=25.0)
-    assert told.interval[1] is None
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_vane_that_reads_nothing_else_in_between_has_no_gap() -> None:
-    stuck = catalogue()["stuck_sensor"]
-    values = {"start": 150.0, "stop": 320.0, "reading": 185.0, "known": 1.0}
-    comparison = prepare(recorded(with_effect(STATION, stuck, "vane", values), 84))
-    guesses = guesses_of(comparison, STATION)
-    assert ("stuck_sensor", "vane") in guesses
-    assert not any(t.held for t in guesses.get(("potentiometer_gap", "vane"), []))
-
-
-def test_a_floating_wiper_that_never_comes_out_on_one_side_tells_no_gap() -> None:
-    values = {"centre": 230.0, "width": 80.0, "reading": 0.0, "form": 2.0}
-    gap = catalogue()["potentiometer_gap"]
-    comparison = prepare(recorded(with_effect(STATION, gap, "vane", values), 84))
-    guesses = guesses_of(comparison, STATION)[("potentiometer_gap", "vane")]
-    assert guesses
-    assert not any(t.held for t in guesses)
-
-
 def test_what_chance_draws_differs_by_as_much_as_chance_says() -> None:
     bouncing = catalogue()["extra_pulses"]
     values = {"bounce_probability": 0.06, "bounce_delay": 0.0005}
@@ -460,40 +241,6 @@ def test_what_is_small_beside_a_large_effect_on_the_same_signals_mends_its_form(
         terms.append(Term(effect, instrument, {effect.parameters[0].name: value}))
     assert only_makes_good(searcher, terms[0], terms) is mends
     assert not only_makes_good(searcher, terms[0], terms[:1])
-
-
-def test_whether_a_turn_is_a_step_or_none_hangs_on_the_last_digit() -> None:
-    step = np.radians(6.0)
-    speed = np.full(2001, 5.0)
-    usual = np.cumsum(np.tile([step, -step], 1001))[:2001]
-
-    def stillness(share_of_none: float) -> float:
-        moves = np.arange(2000) % 1000 >= 1000.0 * share_of_none
-        series = np.cumsum(np.concatenate(([0.0], np.where(moves, step, 0.0))))
-        # Wind from everywhere alike: the slowest third is any third.
-        return float(stillness_statistics(series, usual, speed + 1e-3 * (np.arange(2001) % 7))[0])
-
-    jump = abs(stillness(0.105) - stillness(0.095))
-    assert jump > 1.0
-    assert jump < 4.0 * chance_of_stillness(1.0, 1.0)[0]
-    assert not np.any(chance_of_stillness(1.0, 0.0))
-
-
-def test_the_null_knows_the_last_digit_where_both_read_in_steps() -> None:
-    steps = catalogue()["quantisation"]
-    coarse = with_effect(STATION, steps, "vane", {"step": 6.0, "origin": 0.0})
-    comparison = prepare(recorded(coarse, 84))
-    as_described, as_found = (
-        trust_of(comparison, comparison.simulate(station), baseline())["vane/vane_angle"]
-        for station in (STATION, coarse)
-    )
-    ratio = as_found.statistics_deviation / as_described.statistics_deviation
-    still = slice(BANDS, BANDS + STILLNESS)
-    steps_read = BANDS + STILLNESS + ERRATIC
-    assert np.all(ratio[still] > 2.0)
-    # Between two steps it rests a little: how coarse the readings are is known nearly as before.
-    assert ratio[steps_read] < 2.0
-    assert np.allclose(np.delete(ratio, np.r_[still, steps_read]), 1.0)
 
 
 @pytest.mark.parametrize(

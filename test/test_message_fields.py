@@ -33,7 +33,7 @@ def joint_states(draw: st.DrawFn) -> bytes:
     return bytes(TYPES.serialize_cdr(message, JOINT, little_endian=little))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(joint_states(), min_size=1, max_size=6))
 def test_fields_of_mixed_layouts_equal_rosbags(raw: list[bytes]) -> None:
     places = [("position", 0), ("position", 2), ("velocity", 1)]

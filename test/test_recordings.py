@@ -25,7 +25,7 @@ from wind_sensors.station.signals import (
 
 
 @settings(
-    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(st.integers(0, 2**32))
 def test_every_signal_comes_back_to_the_bit(tmp_path: Path, seed: int) -> None:

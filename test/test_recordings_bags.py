@@ -81,7 +81,7 @@ def long_recording(folder: Path, edges: int) -> tuple[Path, np.ndarray]:
 
 
 @settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(share=st.floats(0.0, 0.999))
 def test_a_bag_cut_anywhere_gives_its_beginning_or_a_clear_refusal(

@@ -97,7 +97,7 @@ def test_a_cup_in_gusts_follows_its_equation():
 
 
 @given(st.floats(-1.0, 1.0))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_small_turn_is_exact_whether_by_series_or_by_the_library(angle):
     np.testing.assert_allclose(small_turn(angle), (np.cos(angle), np.sin(angle)), atol=3e-16)
 
@@ -262,7 +262,7 @@ def test_a_step_from_equilibrium_is_exponential_for_a_cup_without_lambda():
     np.testing.assert_allclose(found.rotors["cup"].y, expected, atol=1e-5)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(1.0, 20.0), st.floats(0.0, 0.9))
 def test_a_propeller_with_friction_settles_at_jacksons_steady_rate(speed, stall):
     """J80 (6): P omega = U - U_s^2 / U."""
@@ -303,7 +303,7 @@ def test_a_propeller_that_is_neither_mounted_nor_aimed_is_the_users_error():
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-0.6, 0.6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_bivane_settles_on_azimuth_and_elevation_of_the_wind(azimuth, elevation):
     b = Bivane(
         name="bivane", azimuth=TOPIC, elevation=TOPIC, distance_constant=2.4, damping_ratio=0.5
@@ -386,7 +386,7 @@ def test_flow_distortion_is_a_fourier_series_of_the_direction_in_the_sensor_fram
 
 
 @given(st.floats(-3.0, 3.0))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_turning_wind_and_platform_together_turns_nothing(turn):
     drive = gusty(count=300)
     station = Station(

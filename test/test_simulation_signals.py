@@ -137,7 +137,7 @@ def test_the_interpolant_is_inverted_to_a_nanosecond():
 
 
 @given(st.floats(0.5, 200.0), st.integers(1, 36))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_steady_rotor_gives_every_slot_once_per_turn(rate, slots):
     rotor = cup(pulses_per_revolution=slots)
     found = seconds(edge_times(steadily_turning(rotor, rate, 10.0), "cup"))

@@ -214,7 +214,7 @@ def stations(draw: st.DrawFn) -> Station:
     return Station(instruments=(cup, propeller), sensor_heading_deg=draw(finite))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(stations())
 def test_what_is_written_reads_back_as_the_same_station(station: Station) -> None:
     profiles = shipped_profiles()
