@@ -146,7 +146,7 @@ def main() -> None:
         "multirotor": replace(multirotor(speed=5.0), roll=sway, pitch=sway),
     }
     groups = {"carefully set up": CAREFUL, "carelessly set up": CARELESS}
-    rows = [("exact platform", "nothing", {})]
+    rows: list[tuple[str, str, Source]] = [("exact platform", "nothing", {})]
     for group, sources in groups.items():
         rows += [(group, name, source) for name, source in sources.items()]
         rows.append((group, "all of these", together(sources)))

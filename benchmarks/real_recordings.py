@@ -18,6 +18,9 @@ from wind_sensors.recordings import load_station, read_recording
 from wind_sensors.report import style
 from wind_sensors.report.outcome_page import panel_figure
 
+WIDTH = 8.0
+"""Of a figure [inch]."""
+
 
 def main() -> None:
     """Draw and say what was written."""
@@ -36,7 +39,7 @@ def main() -> None:
         shown = panels.of_pair(pair, recording.station, corrected)
         with style.house():
             target = options.output / f"means_{first}_{second}.png"
-            panel_figure(shown[:2]).savefig(target, dpi=80)
+            panel_figure(shown[:2], WIDTH).savefig(target, dpi=80)
         print(f"wrote {target}")
 
 
