@@ -21,7 +21,7 @@ from wind_sensors.simulation.encoder import angle_readings
 from wind_sensors.simulation.pulses import edge_times
 from wind_sensors.simulation.response import respond
 from wind_sensors.station.model import Rotor, Station
-from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
+from wind_sensors.station.signals import Angles, FloatArray, Pulses, Recording, Winds
 
 DT = 0.05
 SECONDS = 400.0
@@ -61,11 +61,12 @@ AEROVANE = Station.model_validate(
 )  # fmt: skip
 
 
-def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> np.ndarray:
+def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> FloatArray:
     """Gaussian noise with a correlation time [s] and a standard deviation."""
     decay = np.exp(-DT / seconds)
     drawn = rng.standard_normal(n + 4000)
-    return size * np.sqrt(1.0 - decay**2) * lfilter([1.0], [1.0, -decay], drawn)[4000:]
+    noise: FloatArray = size * np.sqrt(1.0 - decay**2) * lfilter([1.0], [1.0, -decay], drawn)[4000:]
+    return noise
 
 
 def recorded(

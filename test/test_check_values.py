@@ -567,7 +567,7 @@ def test_the_resonance_integral_is_known_from_its_definition() -> None:
     zeta, slope = 0.45, 1.8
 
     def integrand(s: float) -> float:
-        return s ** (2.0 - slope) / ((1.0 - s * s) ** 2 + 4.0 * zeta**2 * s * s)
+        return math.pow(s, 2.0 - slope) / ((1.0 - s * s) ** 2 + 4.0 * zeta**2 * s * s)
 
     value = integrate.quad(integrand, 0.0, math.inf, epsabs=1e-13)[0]
     assert vane_variance.g_integral(zeta, slope) == pytest.approx(value, rel=1e-8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -30,11 +31,11 @@ def test_losses_are_their_defining_integrals(length: float) -> None:
         (transverse_loss, von_karman.transverse_structure_function, von_karman.transverse_spectrum),
     ):
         expected = speed_bias.longitudinal_bias_from_structure_function(
-            lambda r, d=structure: d(r, 1.0, 1.0), length, 1.0, 1.0
+            partial(structure, variance=1.0, wavenumber_q=1.0), length, 1.0, 1.0
         )
         assert float(loss(length)) == pytest.approx(expected, rel=1e-10)
         spectral = speed_bias.longitudinal_bias_from_spectra(
-            lambda k, f=spectrum: f(k, 1.0, 1.0), length, 1.0, 1.0, 1.0
+            partial(spectrum, variance=1.0, wavenumber_q=1.0), length, 1.0, 1.0, 1.0
         )
         assert float(loss(length)) == pytest.approx(spectral, rel=1e-10)
 

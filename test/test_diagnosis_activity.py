@@ -113,7 +113,8 @@ def test_a_change_of_all_instruments_is_the_winds_and_of_one_is_its_own() -> Non
     null = searcher.whitener(searcher.bank.without)
     comparison = searcher.comparison
     counted = comparison.measured.counted
-    later = activity.contrasts((np.arange(counted.size) >= 0.5 * counted.size) * 1.0, counted)
+    second_half = np.arange(counted.size) >= 0.5 * counted.size
+    later = activity.contrasts(second_half.astype(np.float64), counted)
 
     def length_of(livelier: dict[str, float]) -> tuple[float, float]:
         rises = [livelier[c.name] * np.tile(later, activity.BANDS) for c in comparison.channels]

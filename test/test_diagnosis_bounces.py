@@ -36,7 +36,7 @@ def _bouncing(recording: Recording, share: float, seed: int) -> Recording:
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.15])
-def test_bounces_are_taken_out_of_the_series_that_is_compared(share: float):
+def test_bounces_are_taken_out_of_the_series_that_is_compared(share: float) -> None:
     clean = recorded(STATION, 50)
     seen, healthy = prepare(_bouncing(clean, share, 1)), prepare(clean)
     cup = STATION.instrument("cup")
@@ -49,12 +49,12 @@ def test_bounces_are_taken_out_of_the_series_that_is_compared(share: float):
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_no_edge_is_taken_from_a_contact_that_does_not_bounce(seed: int):
+def test_no_edge_is_taken_from_a_contact_that_does_not_bounce(seed: int) -> None:
     assert without_bounces(recorded(STATION, seed).pulses["cup"], 12) is None
 
 
 @pytest.mark.parametrize("pause", [0.3, 0.8])
-def test_edges_that_a_logger_stamps_late_in_lots_are_no_bounces(pause: float):
+def test_edges_that_a_logger_stamps_late_in_lots_are_no_bounces(pause: float) -> None:
     time = recorded(STATION, 0).pulses["cup"].time
     since = 1e-9 * time
     begun = 10.0 * np.floor(since / 10.0)
@@ -70,7 +70,7 @@ def _said(recording: Recording, known: Baseline) -> set[str]:
     return {finding.term.effect.name for finding in found.findings}
 
 
-def test_a_drift_shows_beside_bounces_of_the_same_cup():
+def test_a_drift_shows_beside_bounces_of_the_same_cup() -> None:
     station = with_effect(STATION, catalogue()["calibration_drift"], "cup", {"gain": 1.06})
     seen = _bouncing(recorded(station, 50, swing=0.8), 0.03, 2)
     assert {"extra_pulses", "calibration_drift"} <= _said(seen, baseline())
@@ -85,7 +85,7 @@ def _twice_a_turn(recording: Recording) -> Recording:
 
 
 @pytest.mark.parametrize("begin", [100.13, 210.4])
-def test_the_edges_of_a_silence_call_for_no_second_effect(begin: float):
+def test_the_edges_of_a_silence_call_for_no_second_effect(begin: float) -> None:
     healthy = learn([_twice_a_turn(recorded(STATION, seed, mean=4.0)) for seed in range(4)])
     whole = _twice_a_turn(recorded(STATION, 50, mean=4.0))
     since = 1e-9 * whole.pulses["cup"].time

@@ -21,7 +21,8 @@ from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.diagnosis.healthy.reference_lag import lag_weights
 from wind_sensors.diagnosis.healthy.standing import Evidence, loudest_gains
 
-NOTHING = Fit((), 0.0, np.zeros(0), Simulated({}, {}, {}, {}, np.zeros(0)), np.zeros((0, 0)), 0)
+UNSEEN = Simulated({}, {}, {}, {}, np.zeros(0, dtype=np.bool_))
+NOTHING = Fit((), 0.0, np.zeros(0), UNSEEN, np.zeros((0, 0)), 0)
 QUIET, LOUD = 0.0, 60.0
 POWER = 100.0
 

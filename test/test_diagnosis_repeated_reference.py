@@ -36,7 +36,7 @@ def test_what_is_repeated_for_long_is_left_out_and_the_first_of_it_stays() -> No
     recording = holding(recorded(STATION, 61), 20.0, 4.0)
     found, share = without_repeats(recording)
     assert found.reference is not None and recording.reference is not None
-    silent = ~np.isfinite(found.reference.velocity).all(axis=1)
+    silent = ~np.all(np.isfinite(found.reference.velocity), axis=1)
     seconds = (recording.reference.time - recording.reference.time[0]) * 1e-9
     held = (seconds % 20.0 < 4.0) & (seconds > 1.0)
     np.testing.assert_array_equal(silent[seconds > 4.0], held[seconds > 4.0])

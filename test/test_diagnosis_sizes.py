@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import STATION, baseline, diagnosed, recorded
 
+from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect, with_keys
@@ -456,8 +457,9 @@ def test_what_a_recording_does_not_ask_for_is_left_as_stated(
     values = dict(zip(("dx", "dy", "dz"), place, strict=True))
     lever = Term(catalogue()["lever_arm"], "platform", values)
     offset = Term(catalogue()["vane_offset"], "vane", {"offset": 3.0})
+    nothing = Simulated({}, {}, {}, {}, np.zeros(0, dtype=np.bool_))
     found = Fit(
-        (offset, lever), 0.0, np.zeros(1), None, np.diag([0.01, *[0.3**2] * 3]), 0, 4
+        (offset, lever), 0.0, np.zeros(1), nothing, np.diag([0.01, *[0.3**2] * 3]), 0, 4
     )  # fmt: skip
     _, left = without_spare(found, 4.0)
     assert {name for name, value in left.values.items() if value != 0.0} == kept

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from wind_sensors.diagnosis.comparing import spectra
+from wind_sensors.station.signals import FloatArray
 
 N, DT = 4096, 0.2
 
@@ -54,7 +55,8 @@ def test_slope_is_the_power_of_the_coherence_that_the_errors_imply(
 def test_of_a_simulation_without_coherence_nothing_is_expected() -> None:
     """Noise that a simulation adds where it knows nothing must not be held against it."""
     wide = slice(200, None)
-    chance, known = [], []
+    chance: list[FloatArray] = []
+    known: list[FloatArray] = []
     for seed in range(20):
         truth = _red(seed)
         for kept, other in ((chance, _red(300 + seed)), (known, truth + 0.5 * _red(100 + seed))):

@@ -26,7 +26,11 @@ def test_a_memory_keeps_what_was_used_last() -> None:
     computed: list[str] = []
 
     def result(key: str) -> str:
-        return memory.of(key, lambda: computed.append(key) or key.upper())
+        def compute() -> str:
+            computed.append(key)
+            return key.upper()
+
+        return memory.of(key, compute)
 
     assert [result(k) for k in "abacab"] == list("ABACAB")
     assert computed == list("abcb")

@@ -14,6 +14,7 @@ from wind_sensors.estimation import (
     make_estimator,
     process,
 )
+from wind_sensors.estimation.kalman import KalmanCore
 from wind_sensors.station.signals import Recording
 
 WINDOW = EstimatorSettings(window=100.0)
@@ -77,7 +78,9 @@ def test_slot_errors_are_learnt_without_being_told() -> None:
     recording = blown(mast({"electronics": {"slot_errors": list(planted)}}), duration=120.0)
     estimator = make_estimator(mast(), WINDOW)
     feed(estimator, messages(recording))
-    learnt = estimator._core.filter.slot_error[0, :4]
+    core = estimator._core
+    assert isinstance(core, KalmanCore)
+    learnt = core.filter.slot_error[0, :4]
     # The filter does not know which slot came first.
     turned = [np.roll(planted - planted.mean(), k) for k in range(4)]
     assert min(np.abs(learnt - t).max() for t in turned) < 0.02

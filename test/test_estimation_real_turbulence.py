@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="module")
-def wiener_limit():
+def wiener_limit() -> ModuleType:
     sys.path.insert(0, str(ROOT / "benchmarks"))
     try:
         import wiener_limit as module
@@ -24,7 +25,9 @@ def wiener_limit():
 
 
 @pytest.mark.parametrize("quarter", represented(["1245", "1300"], by=("1245",)))
-def test_the_estimate_is_within_a_tenth_of_the_best_linear_one(wiener_limit, quarter: str) -> None:
+def test_the_estimate_is_within_a_tenth_of_the_best_linear_one(
+    wiener_limit: ModuleType, quarter: str
+) -> None:
     folder = SHARED / wiener_limit.SONIC_FOLDER
     files = sorted(folder.glob(f"*_{quarter}.dat.gz"))
     if not files:
@@ -35,7 +38,9 @@ def test_the_estimate_is_within_a_tenth_of_the_best_linear_one(wiener_limit, qua
         assert found < 0.5 * naive
 
 
-def test_the_linear_limit_is_met_by_a_signal_that_is_filtered_noise(wiener_limit) -> None:
+def test_the_linear_limit_is_met_by_a_signal_that_is_filtered_noise(
+    wiener_limit: ModuleType,
+) -> None:
     """A white signal sampled without noise at half its grid: half of its variance is lost."""
     n = 4096
     white = np.ones(n // 2 + 1)

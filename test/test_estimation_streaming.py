@@ -7,11 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from estimation_cases import blown, feed, mast, messages, truth_at
+from estimation_cases import Message, blown, feed, mast, messages, truth_at
 
 from wind_sensors.errors import UserError
-from wind_sensors.estimation import EstimatorSettings, HealthLevel, make_estimator, process
+from wind_sensors.estimation import (
+    EstimatorSettings,
+    HealthItem,
+    HealthLevel,
+    Method,
+    StreamingEstimator,
+    make_estimator,
+    process,
+)
 from wind_sensors.estimation.core import Estimates
+from wind_sensors.estimation.kalman import KalmanCore
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Angles, Recording, Winds
@@ -24,7 +33,9 @@ def recording() -> Recording:
     return blown(mast(), duration=50.0)
 
 
-def run(stream: list, settings: EstimatorSettings = SETTINGS):
+def run(
+    stream: list[Message], settings: EstimatorSettings = SETTINGS
+) -> tuple[StreamingEstimator, Estimates]:
     estimator = make_estimator(mast(), settings)
     feed(estimator, stream)
     estimator.flush()
@@ -35,19 +46,19 @@ def same(a: Estimates, b: Estimates) -> bool:
     return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
 
 
-def delayed(stream: list, longest: float, seed: int) -> list:
+def delayed(stream: list[Message], longest: float, seed: int) -> list[Message]:
     """The stream in the order of arrival when every message is late by up to `longest` seconds."""
     chance = random.Random(seed)
     return sorted(stream, key=lambda m: m[2] + chance.random() * longest * 1e9)
 
 
-def item(estimator, name: str):
+def item(estimator: StreamingEstimator, name: str) -> HealthItem:
     return next(i for i in estimator.health() if i.name == name)
 
 
 @pytest.mark.parametrize("method", ["kalman", "inverse", "naive"])
 def test_order_of_arrival_and_doubles_do_not_change_a_bit(
-    recording: Recording, method: str
+    recording: Recording, method: Method
 ) -> None:
     settings = EstimatorSettings(method=method, window=20.0)
     stream = messages(recording)
@@ -60,7 +71,7 @@ def test_order_of_arrival_and_doubles_do_not_change_a_bit(
     assert sum(doubled) == 300
 
 
-def in_bursts(stream: list, longest: float) -> list:
+def in_bursts(stream: list[Message], longest: float) -> list[Message]:
     """The stream as a listener that fell behind takes it: input by input, a stretch at a time."""
     return sorted(stream, key=lambda m: (m[2] // round(longest * 1e9), m[1], m[2]))
 
@@ -109,9 +120,10 @@ def test_memory_does_not_grow_with_the_record() -> None:
         shift = part * 40_000_000_000
         feed(estimator, [(k, n, t + shift, v) for k, n, t, v in messages(piece)])
         estimator.take_estimates()
-        ring = estimator._core._ring
+        core = estimator._core
+        assert isinstance(core, KalmanCore)
         waiting = sum(len(r.times) for r in estimator._intake.records.values())
-        sizes.append((ring.time.size, waiting < 400))
+        sizes.append((core._ring.time.size, waiting < 400))
     assert sizes[1] == sizes[2]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from estimation_cases import blown, mast, truth_at
 
-from wind_sensors.estimation import EstimatorSettings, process
+from wind_sensors.estimation import EstimatorSettings, Method, process
 from wind_sensors.estimation.inverse_kernel import (
     forcing_from_motion,
     local_parabola,
@@ -97,7 +97,9 @@ def test_direction_variance_is_corrected_towards_the_truth() -> None:
     )
 
 
-CUP = rotor_parameters(mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0])
+RUBBING_CUP = mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0]
+assert isinstance(RUBBING_CUP, Cup)
+CUP = rotor_parameters(RUBBING_CUP)
 PROPELLER = rotor_parameters(
     Propeller.model_validate(
         {
@@ -143,7 +145,7 @@ def test_the_inverse_vane_equation_gives_the_direction_back(cable: dict[str, flo
 
 
 @pytest.mark.parametrize("method", ["kalman", "inverse"])
-def test_the_pull_of_a_cable_that_is_known_is_undone(method: str) -> None:
+def test_the_pull_of_a_cable_that_is_known_is_undone(method: Method) -> None:
     wound = {"cable_speed": 1.5, "cable_rest_deg": 150.0}
     recording = blown(mast(vane=wound), speed=5.0, duration=90.0)
     turned = {}
@@ -163,7 +165,7 @@ def test_the_pull_of_a_cable_that_is_known_is_undone(method: str) -> None:
 
 def test_the_local_parabola_is_exact_for_a_parabola() -> None:
     time = np.sort(np.random.default_rng(1).integers(0, 2_000_000_000, 80))
-    x = (time - 900_000_000) * 1e-9
+    x = (time - 900_000_000).astype(np.float64) * 1e-9
     value, rate, second, *_ = local_parabola(
         time, 3.0 - 2.0 * x + 5.0 * x * x, np.empty(0), 900_000_000, 0.13
     )
@@ -174,7 +176,10 @@ def test_the_inverse_method_lies_between_naive_and_kalman() -> None:
     recording = blown(mast(), speed=7.0, duration=90.0)
     assert isinstance(recording.station.instruments[0], Cup)
     rms = {}
-    for method, bandwidth in (("kalman", 1.0), ("inverse", 1.0), ("inverse", 3.0), ("naive", 1.0)):
+    cases: tuple[tuple[Method, float], ...] = (
+        ("kalman", 1.0), ("inverse", 1.0), ("inverse", 3.0), ("naive", 1.0),
+    )  # fmt: skip
+    for method, bandwidth in cases:
         found = process(
             recording, EstimatorSettings(method=method, bandwidth=bandwidth, window=90.0)
         )

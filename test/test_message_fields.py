@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -40,7 +42,7 @@ def test_fields_of_mixed_layouts_equal_rosbags(raw: list[bytes]) -> None:
     found = columns(raw, TYPES, JOINT, places)
     time = stamps(raw, TYPES, JOINT, ("header", "stamp"))
     for index, data in enumerate(raw):
-        message = TYPES.deserialize_cdr(data, JOINT)
+        message: Any = TYPES.deserialize_cdr(data, JOINT)
         assert time[index] == message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         for column, (name, item) in zip(found, places, strict=True):
             values = getattr(message, name)
@@ -80,7 +82,8 @@ def test_types_that_only_the_bag_defines() -> None:
     blank = template(types, "my_msgs/msg/Deep", [path], {("label",): "abc"})
     raw = serialised(types, blank, {path: np.asarray([2.5, -1.0])})
     assert columns(raw, types, "my_msgs/msg/Deep", [path])[0].tolist() == [2.5, -1.0]
-    assert types.deserialize_cdr(raw[1], "my_msgs/msg/Deep").steps[1].value == -1.0
+    deep: Any = types.deserialize_cdr(raw[1], "my_msgs/msg/Deep")
+    assert deep.steps[1].value == -1.0
 
 
 def test_integers_are_rounded_and_kept_in_range() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any, Literal
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,7 +21,7 @@ from wind_sensors.motion.downwash import (
 from wind_sensors.motion.platform_errors import reported_motion, true_motion
 from wind_sensors.motion.platform_track import Motion, PlatformTrack, TrackLimits, shifted
 from wind_sensors.station.model import Clock, Downwash, HeadingDeviation, Platform
-from wind_sensors.station.signals import PlatformStates
+from wind_sensors.station.signals import FloatArray, PlatformStates
 
 angles = st.floats(-3.0, 3.0)
 components = st.floats(-20.0, 20.0)
@@ -28,7 +31,12 @@ attitudes = st.tuples(angles, angles, angles).map(
 )
 
 
-def motion_at(attitude, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), count=1) -> Motion:
+def motion_at(
+    attitude: npt.ArrayLike,
+    velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+    rate: npt.ArrayLike = (0.0, 0.0, 0.0),
+    count: int = 1,
+) -> Motion:
     return Motion(
         np.tile(np.asarray(attitude, dtype=float), (count, 1)),
         np.tile(np.asarray(velocity, dtype=float), (count, 1)),
@@ -37,7 +45,7 @@ def motion_at(attitude, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), count=1)
     )
 
 
-def swaying_states(count: int = 400, dt: float = 0.05) -> tuple[PlatformStates, np.ndarray]:
+def swaying_states(count: int = 400, dt: float = 0.05) -> tuple[PlatformStates, FloatArray]:
     """A carrier that turns, rolls and moves; its states by SciPy's rotations."""
     t = np.arange(count) * dt
     rpy = np.stack((0.1 * np.sin(t), 0.05 * np.cos(1.3 * t), 0.2 * t), axis=1)
@@ -63,7 +71,9 @@ def swaying_states(count: int = 400, dt: float = 0.05) -> tuple[PlatformStates, 
 
 
 @given(attitudes, attitudes, vectors)
-def test_rotations_agree_with_scipy(first, second, vector):
+def test_rotations_agree_with_scipy(
+    first: FloatArray, second: FloatArray, vector: FloatArray
+) -> None:
     a, b = Rotation.from_quat(first), Rotation.from_quat(second)
     np.testing.assert_allclose(rotations.rotate(first, vector), a.apply(vector), atol=1e-12)
     np.testing.assert_allclose(rotations.matrix(first), a.as_matrix(), atol=1e-12)
@@ -75,14 +85,18 @@ def test_rotations_agree_with_scipy(first, second, vector):
 
 
 @given(attitudes, attitudes, st.floats(0.0, 1.0))
-def test_slerp_follows_the_great_circle(first, second, fraction):
+def test_slerp_follows_the_great_circle(
+    first: FloatArray, second: FloatArray, fraction: float
+) -> None:
     expected = Slerp([0.0, 1.0], Rotation.from_quat([first, second]))(fraction)
     found = Rotation.from_quat(rotations.slerp(first, second, np.asarray(fraction)))
     assert (expected.inv() * found).magnitude() < 1e-6
 
 
 @given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
-def test_roll_pitch_yaw_are_turns_about_z_then_y_then_x(roll, pitch, yaw):
+def test_roll_pitch_yaw_are_turns_about_z_then_y_then_x(
+    roll: float, pitch: float, yaw: float
+) -> None:
     q = rotations.from_roll_pitch_yaw(roll, pitch, yaw)
     expected = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
     np.testing.assert_allclose(rotations.matrix(q), expected, atol=1e-12)
@@ -97,12 +111,12 @@ def test_roll_pitch_yaw_are_turns_about_z_then_y_then_x(roll, pitch, yaw):
     ("velocity", "from_deg"),
     [((0, -5, 0), 0.0), ((-5, 0, 0), 90.0), ((0, 5, 0), 180.0), ((5, 0, 0), 270.0)],
 )
-def test_a_north_wind_blows_southwards(velocity, from_deg):
+def test_a_north_wind_blows_southwards(velocity: tuple[int, int, int], from_deg: float) -> None:
     assert float(frames.direction_from_deg(velocity)) == pytest.approx(from_deg)
     np.testing.assert_allclose(frames.velocity_from_direction(5.0, from_deg), velocity, atol=1e-12)
 
 
-def test_compass_headings_count_clockwise_from_the_north_they_name():
+def test_compass_headings_count_clockwise_from_the_north_they_name() -> None:
     np.testing.assert_allclose(frames.yaw_from_compass([0.0, 90.0]), [np.pi / 2, 0.0], atol=1e-12)
     # Magnetic north lies 10 degrees east of true north: a magnetic heading of 350 is true north.
     assert float(frames.yaw_from_compass(350.0, 10.0)) == pytest.approx(np.pi / 2)
@@ -110,7 +124,7 @@ def test_compass_headings_count_clockwise_from_the_north_they_name():
 
 
 @given(attitudes, vectors)
-def test_ned_and_enu_describe_the_same_rotation(attitude, vector):
+def test_ned_and_enu_describe_the_same_rotation(attitude: FloatArray, vector: FloatArray) -> None:
     in_ned = frames.attitude_ned_from_enu(attitude)
     through_ned = frames.swap_enu_ned(rotations.rotate(in_ned, frames.swap_flu_frd(vector)))
     np.testing.assert_allclose(through_ned, rotations.rotate(attitude, vector), atol=1e-12)
@@ -118,13 +132,13 @@ def test_ned_and_enu_describe_the_same_rotation(attitude, vector):
     assert abs(float(np.dot(back, attitude))) == pytest.approx(1.0)
 
 
-def test_level_and_facing_north_is_no_rotation_in_ned():
+def test_level_and_facing_north_is_no_rotation_in_ned() -> None:
     facing_north = rotations.from_roll_pitch_yaw(0.0, 0.0, np.pi / 2)
     in_ned = frames.attitude_ned_from_enu(facing_north)
     np.testing.assert_allclose(np.abs(in_ned), [0, 0, 0, 1], atol=1e-12)
 
 
-def test_a_steadily_turning_platform_is_interpolated_on_the_sphere():
+def test_a_steadily_turning_platform_is_interpolated_on_the_sphere() -> None:
     rate = np.array([0.3, -0.2, 0.5])
     t = np.arange(0.0, 10.0, 0.5)
     attitude = Rotation.from_rotvec(np.outer(t, rate)).as_quat()
@@ -138,7 +152,7 @@ def test_a_steadily_turning_platform_is_interpolated_on_the_sphere():
     assert (expected.inv() * Rotation.from_quat(found)).magnitude().max() < 1e-8
 
 
-def test_beyond_the_last_state_the_platform_carries_on_and_certainty_falls():
+def test_beyond_the_last_state_the_platform_carries_on_and_certainty_falls() -> None:
     states, _ = swaying_states()
     track = PlatformTrack(states, TrackLimits(longest_extrapolation=0.5))
     last = int(states.time[-1])
@@ -152,7 +166,7 @@ def test_beyond_the_last_state_the_platform_carries_on_and_certainty_falls():
     assert (turned.inv() * Rotation.from_quat(ahead.motion.attitude[1])).magnitude() < 1e-9
 
 
-def test_a_long_gap_is_guesswork_and_its_edges_are_not():
+def test_a_long_gap_is_guesswork_and_its_edges_are_not() -> None:
     states, _ = swaying_states(count=200)
     keep = np.r_[0:50, 150:200]
     track = PlatformTrack(
@@ -165,7 +179,7 @@ def test_a_long_gap_is_guesswork_and_its_edges_are_not():
     assert sample.known.tolist() == [True, True, False, True]
 
 
-def test_unordered_doubled_and_broken_states_do_no_harm():
+def test_unordered_doubled_and_broken_states_do_no_harm() -> None:
     states, _ = swaying_states(count=100)
     order = np.random.default_rng(1).permutation(np.r_[0:100, 10:20])
     attitude = states.attitude[order].copy()
@@ -182,13 +196,13 @@ def test_unordered_doubled_and_broken_states_do_no_harm():
     np.testing.assert_allclose(found.velocity, clean.velocity, atol=2e-3)
 
 
-def test_a_platform_without_a_usable_state_is_the_users_error():
+def test_a_platform_without_a_usable_state_is_the_users_error() -> None:
     nothing = np.full((3, 3), np.nan)
     with pytest.raises(UserError, match="no usable state"):
         PlatformTrack(PlatformStates(np.arange(3), np.zeros((3, 4)), nothing, nothing, nothing))
 
 
-def test_apparent_wind_is_the_wind_minus_the_way_the_sensor_goes():
+def test_apparent_wind_is_the_wind_minus_the_way_the_sensor_goes() -> None:
     """The sensor's velocity from the difference of its positions, not from omega x r."""
     states, _ = swaying_states(count=4000, dt=0.005)
     arm = np.array([0.3, -0.2, 4.0])
@@ -207,7 +221,9 @@ def test_apparent_wind_is_the_wind_minus_the_way_the_sensor_goes():
 
 
 @given(vectors, vectors, vectors, attitudes, st.floats(-3.0, 3.0))
-def test_turning_the_whole_world_changes_nothing_a_sensor_feels(wind, velocity, rate, q, turn):
+def test_turning_the_whole_world_changes_nothing_a_sensor_feels(
+    wind: FloatArray, velocity: FloatArray, rate: FloatArray, q: FloatArray, turn: float
+) -> None:
     arm, mount = (0.1, 0.2, 3.0), np.eye(3)
     before = relative_wind.apparent_wind(wind[None], motion_at(q, velocity, rate), arm, mount)
     world = Rotation.from_euler("z", turn)
@@ -217,7 +233,9 @@ def test_turning_the_whole_world_changes_nothing_a_sensor_feels(wind, velocity, 
 
 
 @given(vectors, vectors, vectors, attitudes)
-def test_only_the_difference_of_wind_and_platform_velocity_is_felt(wind, velocity, shift, q):
+def test_only_the_difference_of_wind_and_platform_velocity_is_felt(
+    wind: FloatArray, velocity: FloatArray, shift: FloatArray, q: FloatArray
+) -> None:
     arm, mount = (0.0, 0.0, 2.0), np.eye(3)
     still = relative_wind.apparent_wind(wind[None], motion_at(q, velocity), arm, mount)
     carried = motion_at(q, velocity + Rotation.from_quat(q).inv().apply(shift))
@@ -226,7 +244,7 @@ def test_only_the_difference_of_wind_and_platform_velocity_is_felt(wind, velocit
 
 
 @pytest.mark.parametrize("velocity_in_earth", [False, True])
-def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth):
+def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth: bool) -> None:
     draw = np.random.default_rng(5)
     count = 200_000
     attitude = Rotation.from_euler("ZYX", [0.7, 0.1, -0.2])
@@ -261,8 +279,16 @@ def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth):
     st.floats(-30.0, 30.0),
 )  # fmt: skip
 def test_what_a_platform_reports_leads_back_to_what_it_did(
-    a, b, c, d, e, scale, frame, axes, north
-):
+    a: float,
+    b: float,
+    c: float,
+    d: float,
+    e: float,
+    scale: float,
+    frame: Literal["enu", "ned"],
+    axes: Literal["platform", "earth"],
+    north: float,
+) -> None:
     platform = Platform(
         heading_deviation=HeadingDeviation(
             constant_deg=a, sine_deg=b, cosine_deg=c, sine_2_deg=d, cosine_2_deg=e
@@ -280,7 +306,7 @@ def test_what_a_platform_reports_leads_back_to_what_it_did(
     np.testing.assert_allclose(back.position, motion.position, atol=1e-9)
 
 
-def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading():
+def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading() -> None:
     platform = Platform(
         heading_deviation=HeadingDeviation(
             constant_deg=2.0, sine_deg=5.0, cosine_deg=-3.0, sine_2_deg=1.5, cosine_2_deg=-0.8
@@ -299,7 +325,7 @@ def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading():
     assert np.abs((shown - expected + 180.0) % 360.0 - 180.0).max() < 1e-9
 
 
-def test_a_late_clock_shows_an_earlier_state():
+def test_a_late_clock_shows_an_earlier_state() -> None:
     states, _ = swaying_states(count=400)
     motion = Motion(states.attitude, states.velocity, states.angular_rate, states.position)
     late = shifted(motion, 0.05, -0.2)
@@ -309,7 +335,7 @@ def test_a_late_clock_shows_an_earlier_state():
 
 
 @given(st.floats(0.5, 10.0), st.floats(0.0, 20.0))
-def test_downwash_obeys_momentum_theory(hover, airspeed):
+def test_downwash_obeys_momentum_theory(hover: float, airspeed: float) -> None:
     added = rotor_downwash(
         Downwash(induced_velocity=hover, wake_skew=0.5), np.array([[-airspeed, 0.0, 0.0]])
     )[0]
@@ -318,7 +344,7 @@ def test_downwash_obeys_momentum_theory(hover, airspeed):
     assert added[0] == pytest.approx(-0.5 * induced * airspeed / hover)
 
 
-def test_a_jet_beside_its_rotor_blows_outwards_with_the_platform():
+def test_a_jet_beside_its_rotor_blows_outwards_with_the_platform() -> None:
     apparent = np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]])
     added = rotor_downwash(Downwash(induced_velocity=2.0, spread=(0.3, -0.1)), apparent)
     np.testing.assert_allclose(added[:, 0], -0.3 * added[:, 2])
@@ -327,7 +353,9 @@ def test_a_jet_beside_its_rotor_blows_outwards_with_the_platform():
 
 
 @given(st.floats(1.0, 100.0), st.floats(0.05, 2.0), st.floats(0.4, 0.9), st.floats(0.05, 1.0))
-def test_thrust_and_the_power_it_takes_give_the_same_inflow(thrust, area, merit, share):
+def test_thrust_and_the_power_it_takes_give_the_same_inflow(
+    thrust: float, area: float, merit: float, share: float
+) -> None:
     by_thrust = hover_induced_velocity(
         Downwash(thrust=thrust, disc_area=area, sensor_share=share)
     )
@@ -345,7 +373,7 @@ def test_thrust_and_the_power_it_takes_give_the_same_inflow(thrust, area, merit,
     assert by_power == pytest.approx(by_thrust)
 
 
-def test_a_column_of_ring_vortices_draws_air_as_biot_and_savart_say():
+def test_a_column_of_ring_vortices_draws_air_as_biot_and_savart_say() -> None:
     radius, height = 0.3, 0.25
     below = np.linspace(0.0, 400.0, 4_000_001)
     ring = radius**2 / (2.0 * (radius**2 + (height + below) ** 2) ** 1.5)
@@ -357,12 +385,12 @@ def test_a_column_of_ring_vortices_draws_air_as_biot_and_savart_say():
 @pytest.mark.parametrize(
     "wrong", [{"thrust": 10.0}, {"thrust": 10.0, "hover_power": 50.0, "disc_area": 1.0}]
 )
-def test_an_inflow_without_its_rotors_is_refused(wrong):
+def test_an_inflow_without_its_rotors_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"disc_area|not both"):
         Downwash(**wrong)
 
 
-def test_felt_gravity_is_the_plumb_line_of_a_swing():
+def test_felt_gravity_is_the_plumb_line_of_a_swing() -> None:
     """A body in free fall feels nothing; one at rest and leaning feels g along its own axes."""
     t = np.arange(100) * 0.05
     fall = np.zeros((100, 3))
@@ -379,7 +407,9 @@ def test_felt_gravity_is_the_plumb_line_of_a_swing():
 
 
 @given(vectors, attitudes, angles)
-def test_the_wind_along_the_platforms_axes_is_the_felt_wind_and_the_motion(wind, q, yaw):
+def test_the_wind_along_the_platforms_axes_is_the_felt_wind_and_the_motion(
+    wind: FloatArray, q: FloatArray, yaw: float
+) -> None:
     """R^T wind = S apparent + velocity, whichever way the sensor is mounted."""
     platform = Platform(sensor_rotation_deg=(3.0, -2.0, float(np.degrees(yaw))))
     rotation = relative_wind.sensor_rotation(platform)

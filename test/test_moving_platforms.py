@@ -119,10 +119,8 @@ def test_without_odometry_no_wind_is_published_and_it_comes_back() -> None:
     gone = replace(
         recording,
         platform=PlatformStates(
-            *(column[kept] for column in (
-                states.time, states.attitude, states.velocity, states.angular_rate,
-                states.position,
-            ))
+            states.time[kept], states.attitude[kept], states.velocity[kept],
+            states.angular_rate[kept], states.position[kept],
         ),
     )  # fmt: skip
     found = process(gone)

@@ -27,6 +27,7 @@ from wind_sensors.nodes.topics import TRUTH_TOPIC, raw_topics, station_topics
 from wind_sensors.recordings import load_station, read_recording
 from wind_sensors.recordings.bag import read_bag
 from wind_sensors.simulation.run import simulate
+from wind_sensors.station.model import Cup
 from wind_sensors.station.signals import Recording
 
 DURATION = 16.0
@@ -158,7 +159,7 @@ def test_live_signals_are_those_of_an_offline_simulation(graph: Graph, tmp_path:
 def test_transport_faults_are_survived_told_and_repeated_offline(
     graph: Graph, tmp_path: Path
 ) -> None:
-    faults = {
+    faults: dict[str, Any] = {
         "faults.loss": 0.1,
         "faults.doubling": 0.1,
         "faults.jitter": 0.05,
@@ -183,7 +184,7 @@ def test_transport_faults_are_survived_told_and_repeated_offline(
 def test_a_clock_that_jumps_back_is_reported_and_the_wind_goes_on(
     graph: Graph, tmp_path: Path
 ) -> None:
-    faults = {"faults.clock_jump_at": 8.0, "faults.clock_jump": -1000.0}
+    faults: dict[str, Any] = {"faults.clock_jump_at": 8.0, "faults.clock_jump": -1000.0}
     run = LiveRun(graph, tmp_path / "recording", "mast_cup_vane", **faults)
     clock = run.status("clock")
     assert values(clock)["jumps"] == "1"
@@ -198,6 +199,7 @@ def test_a_clock_that_jumps_back_is_reported_and_the_wind_goes_on(
 def test_a_counter_that_wraps_gives_the_wind_of_single_edges(graph: Graph, tmp_path: Path) -> None:
     wrapping = tmp_path / "wrapping.yaml"
     edges = load_station("mast_cup_vane").instrument("cup")
+    assert isinstance(edges, Cup)
     wrapping.write_text(
         "instruments:\n"
         "- {name: cup, profile: risoe_cup, pulses_per_revolution: 2, pulses: {topic: /cup/count, "
@@ -206,7 +208,7 @@ def test_a_counter_that_wraps_gives_the_wind_of_single_edges(graph: Graph, tmp_p
         "damping_ratio: 0.38}\n",
         encoding="utf-8",
     )
-    parameters = {"faults.counter_modulus": 64}
+    parameters: dict[str, Any] = {"faults.counter_modulus": 64}
     run = LiveRun(graph, tmp_path / "recording", str(wrapping), **parameters)
     counted = run.recording.pulses["cup"]
     assert counted.turns is not None

@@ -56,8 +56,7 @@ def tf2(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     module = ModuleType("tf2_ros")
     module.__spec__ = ModuleSpec("tf2_ros", None)
-    module.Buffer, module.TransformListener = Buffer, Listener
-    module.TransformException = Unknown
+    vars(module).update(Buffer=Buffer, TransformListener=Listener, TransformException=Unknown)
     monkeypatch.setitem(sys.modules, "tf2_ros", module)
     return state
 

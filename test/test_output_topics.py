@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -106,7 +107,8 @@ def test_estimates_become_the_documented_output_topics(tmp_path: Path) -> None:
     for topic in ("/wind", "/wind/apparent", "/wind/mean", "/wind/bias"):
         assert types[topic] == twist
     assert types["/wind/vector"] == "geometry_msgs/msg/Vector3Stamped"
-    (status,) = typestore().deserialize_cdr(raw, types["/diagnostics"]).status
+    told: Any = typestore().deserialize_cdr(raw, types["/diagnostics"])
+    (status,) = told.status
     assert (status.name, status.message, int(status.level)) == ("cup", "slow", 1)
     assert "/wind/body" not in types
     again = read_recording(folder)

@@ -5,24 +5,28 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from wind_sensors.instruments import friction_propeller, propeller_array
 from wind_sensors.instruments.friction_propeller import FrictionPropeller
+from wind_sensors.station.signals import FloatArray
 
 
-def measured_response(angle: object) -> np.ndarray:
+def measured_response(angle: npt.ArrayLike) -> FloatArray:
     """A response that departs from the cosine by up to 15 %, as Gill propellers do."""
     theta = np.asarray(angle, dtype=float)
-    return np.cos(theta) * (1.0 - 0.15 * np.sin(theta) ** 2)
+    response: FloatArray = np.cos(theta) * (1.0 - 0.15 * np.sin(theta) ** 2)
+    return response
 
 
 ROTOR = FrictionPropeller(0.3 / (2.0 * math.pi), 1.0, 0.2, f=measured_response)
 
 
-def directions(generator: np.random.Generator, count: int) -> np.ndarray:
+def directions(generator: np.random.Generator, count: int) -> FloatArray:
     vectors = generator.standard_normal((count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit: FloatArray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return unit
 
 
 @pytest.mark.parametrize("mounting", ["orthogonal", "tripod", "four"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,7 +108,7 @@ def test_the_comparison_runs_from_regressors_to_the_page(
             effects=effects, sizes=np.ones(3), channel=np.zeros(600, dtype=int),
         )  # fmt: skip
     cause = {"effect": "vane_offset", "size_factor": 3.0}
-    answers = {
+    answers: dict[str, dict[str, Any]] = {
         "found": {"stratum": "single", "causes": [cause], "without": []},
         "gone": {"stratum": "withheld", "causes": [cause], "without": ["vane_offset"]},
         "well": {"stratum": "healthy", "causes": [], "without": []},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -185,7 +186,7 @@ def test_shared_recordings_equal_rosbags_and_survive_a_round_trip(
     assert recording.notes == ()
     with Reader(SHARED / name / "bag") as reader:
         chosen = [c for c in reader.connections if c.topic != "/platform/odom"]
-        messages = [
+        messages: list[tuple[str, Any]] = [
             (c.topic, TYPES.deserialize_cdr(raw, c.msgtype))
             for c, _, raw in reader.messages(connections=chosen)
         ]

@@ -28,6 +28,7 @@ from wind_sensors.station.signals import (
     Pulses,
     Recording,
     Series,
+    TimeArray,
     Winds,
 )
 from wind_sensors.station.writing import station_to_yaml
@@ -174,7 +175,7 @@ def test_impossible_winds_are_left_out_and_noted(tmp_path: Path) -> None:
     assert "/w: 2 of 2000 winds are faster than 150 m/s and were left out" in after.notes
 
 
-def set_back_at(times: np.ndarray, index: int, by: int) -> np.ndarray:
+def set_back_at(times: TimeArray, index: int, by: int) -> TimeArray:
     """Times of a clock that is set back before the index-th message."""
     return times - by * (np.arange(len(times)) >= index)
 

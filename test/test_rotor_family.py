@@ -10,6 +10,7 @@ from scipy import integrate
 
 from wind_sensors.instruments import cup, rotor_family
 from wind_sensors.instruments.periodic import periodic_rate
+from wind_sensors.station.signals import FloatArray
 
 
 def integrated(a4: float, initial: float, wind_run: float) -> float:
@@ -90,8 +91,8 @@ def test_second_order_expansion_describes_the_torque() -> None:
     assert remainders[1] > 0.0
 
 
-def periodic_by_integration(a4: float, amplitude: float, k: float, lift: float) -> np.ndarray:
-    def slope(theta: float, y: np.ndarray) -> np.ndarray:
+def periodic_by_integration(a4: float, amplitude: float, k: float, lift: float) -> FloatArray:
+    def slope(theta: float, y: FloatArray) -> FloatArray:
         a = 1.0 + amplitude * math.sin(theta)
         forcing = (a - y) * (a4 * a + (1.0 - a4) * y) + lift
         return np.asarray(forcing / k)
@@ -101,7 +102,7 @@ def periodic_by_integration(a4: float, amplitude: float, k: float, lift: float) 
         slope, (0.0, 2.0 * math.pi * periods), [1.0], method="DOP853", rtol=1e-11, atol=1e-12
     ).y[0, -1]
     theta = np.linspace(0.0, 2.0 * math.pi, 401)[:-1]
-    return integrate.solve_ivp(
+    y: FloatArray = integrate.solve_ivp(
         slope,
         (0.0, 2.0 * math.pi),
         [start],
@@ -110,6 +111,7 @@ def periodic_by_integration(a4: float, amplitude: float, k: float, lift: float) 
         atol=1e-12,
         t_eval=theta,
     ).y[0]
+    return y
 
 
 @pytest.mark.parametrize(

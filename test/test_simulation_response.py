@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,44 +31,65 @@ from wind_sensors.station.model import (
     WakeShadow,
 )
 from wind_sensors.station.parameters import vane_parameters
+from wind_sensors.station.signals import FloatArray
 
 TOPIC = Input(topic="/x")
 START = 1_700_000_000_000_000_000
 
 
-def cup(**changes) -> Cup:
-    constants = dict(
+def cup(**changes: Any) -> Cup:
+    constants: dict[str, Any] = dict(
         name="cup", pulses=TOPIC, pulses_per_revolution=4, calibration_distance=0.2,
         distance_constant=1.7, starting_speed=0.25, mu1=0.05, mu2=0.6, a4=0.8,
     )  # fmt: skip
     return Cup(**{**constants, **changes})
 
 
-def vane(**changes) -> Vane:
-    constants = dict(name="vane", joint_states=TOPIC, distance_constant=0.6, damping_ratio=0.3)
+def vane(**changes: Any) -> Vane:
+    constants: dict[str, Any] = dict(
+        name="vane", joint_states=TOPIC, distance_constant=0.6, damping_ratio=0.3
+    )
     return Vane(**{**constants, **changes})
 
 
-def propeller(**changes) -> Propeller:
-    constants = dict(
+def propeller(**changes: Any) -> Propeller:
+    constants: dict[str, Any] = dict(
         name="propeller", pulses=TOPIC, pulses_per_revolution=2, calibration_distance=0.05,
         distance_constant=1.0,
     )  # fmt: skip
     return Propeller(**{**constants, **changes})
 
 
-def gusty(count=600, dt=0.05, seed=1, mean=(6.0, 3.0, 0.0), size=1.2) -> Drive:
+def gusty(
+    count: int = 600,
+    dt: float = 0.05,
+    seed: int = 1,
+    mean: npt.ArrayLike = (6.0, 3.0, 0.0),
+    size: float = 1.2,
+) -> Drive:
     draw = np.random.default_rng(seed)
     noise = draw.normal(size=(count + 40, 3))
     smooth = np.stack([np.convolve(noise[:, k], np.ones(8) / 2.8, "valid") for k in range(3)], 1)
     return Drive(START, dt, np.asarray(mean) + size * smooth[:count])
 
 
-def steady(wind, count=1200, dt=0.05, motion=None, **air) -> Drive:
-    return Drive(START, dt, np.tile(np.asarray(wind, dtype=float), (count, 1)), motion, **air)
+def steady(
+    wind: npt.ArrayLike,
+    count: int = 1200,
+    dt: float = 0.05,
+    motion: Motion | None = None,
+    density: FloatArray | None = None,
+) -> Drive:
+    blowing = np.tile(np.asarray(wind, dtype=float), (count, 1))
+    return Drive(START, dt, blowing, motion, density=density)
 
 
-def at_rest(count, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), attitude=None) -> Motion:
+def at_rest(
+    count: int,
+    velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+    rate: npt.ArrayLike = (0.0, 0.0, 0.0),
+    attitude: FloatArray | None = None,
+) -> Motion:
     q = np.tile(rotations.IDENTITY, (count, 1)) if attitude is None else attitude
     return Motion(
         q, np.tile(np.asarray(velocity, float), (count, 1)),
@@ -73,7 +97,7 @@ def at_rest(count, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), attitude=None
     )  # fmt: skip
 
 
-def test_a_cup_in_gusts_follows_its_equation():
+def test_a_cup_in_gusts_follows_its_equation() -> None:
     """K94 (2) with K14 (83) as forcing, written out again and given to SciPy."""
     drive = gusty()
     c = cup()
@@ -82,7 +106,7 @@ def test_a_cup_in_gusts_follows_its_equation():
     forcing = h + c.mu1 * w + c.mu2 * (np.sqrt(h * h + w * w) - h) - c.starting_speed
     t = drive.dt * np.arange(len(drive))
 
-    def slope(time, state):
+    def slope(time: float, state: FloatArray) -> list[float]:
         a = np.interp(time, t, forcing)
         y = state[0]
         return [(a - y) * (c.a4 * a + (1 - c.a4) * y) / c.distance_constant, y / 0.2]
@@ -98,11 +122,11 @@ def test_a_cup_in_gusts_follows_its_equation():
 
 @given(st.floats(-1.0, 1.0))
 @settings(max_examples=200)
-def test_a_small_turn_is_exact_whether_by_series_or_by_the_library(angle):
+def test_a_small_turn_is_exact_whether_by_series_or_by_the_library(angle: float) -> None:
     np.testing.assert_allclose(small_turn(angle), (np.cos(angle), np.sin(angle)), atol=3e-16)
 
 
-def test_a_vane_on_a_turning_unbalanced_mount_follows_its_equation():
+def test_a_vane_on_a_turning_unbalanced_mount_follows_its_equation() -> None:
     drive = gusty(count=400)
     count = len(drive)
     t = drive.dt * np.arange(count)
@@ -119,7 +143,7 @@ def test_a_vane_on_a_turning_unbalanced_mount_follows_its_equation():
     spin = axis.inv().apply(rates)[:, 2]
     pull = axis.inv().apply((0.0, 0.0, -9.80665))
 
-    def slope(time, state):
+    def slope(time: float, state: FloatArray) -> list[float]:
         x, y = np.interp(time, t, felt[:, 0]), np.interp(time, t, felt[:, 1])
         omega = np.interp(time, t, spin)
         left = min(int(time / drive.dt), count - 2)
@@ -143,7 +167,7 @@ def test_a_vane_on_a_turning_unbalanced_mount_follows_its_equation():
     assert np.abs(error).max() < 1e-3
 
 
-def test_a_bearing_that_catches_holds_the_vane_at_one_heading_only():
+def test_a_bearing_that_catches_holds_the_vane_at_one_heading_only() -> None:
     """The wind turns by 40 degrees in 80 s; friction h_c^2 balances h^2 sin(deviation)."""
     turning = np.radians(np.linspace(-20.0, 20.0, 1600))
     wind = -5.0 * np.stack((np.cos(turning), np.sin(turning), 0.0 * turning), axis=1)
@@ -161,7 +185,7 @@ def test_a_bearing_that_catches_holds_the_vane_at_one_heading_only():
     assert np.abs(behind[far]).max() < 0.1
 
 
-def test_a_fin_that_gives_way_swings_more_slowly_in_strong_wind_only():
+def test_a_fin_that_gives_way_swings_more_slowly_in_strong_wind_only() -> None:
     """Against the period of a free swing, 2 pi l_v / U, and half the force at the yield speed."""
     periods = {}
     for speed in (2.0, 10.0):
@@ -180,7 +204,7 @@ def test_a_fin_that_gives_way_swings_more_slowly_in_strong_wind_only():
         assert slower == pytest.approx(share**-0.5, rel=0.02)
 
 
-def test_a_cable_pulls_a_vane_back_to_where_it_is_not_wound_up():
+def test_a_cable_pulls_a_vane_back_to_where_it_is_not_wound_up() -> None:
     """Against the balance of torques, in winds of several speeds and after a whole turn."""
     wound = vane(cable_speed=1.0, cable_rest_deg=60.0, damping_ratio=0.7)
     for speed in (3.0, 6.0):
@@ -194,14 +218,16 @@ def test_a_cable_pulls_a_vane_back_to_where_it_is_not_wound_up():
             assert to_wind == pytest.approx(angle - np.radians(60.0), rel=1e-4)
 
 
-def test_oil_in_the_bearing_damps_a_vane_by_as_much_in_any_wind():
+def test_oil_in_the_bearing_damps_a_vane_by_as_much_in_any_wind() -> None:
     oiled = vane(viscous_damping=4.0, inertia_factor=1.5)
     rate = 4.0 * 2.0 * oiled.damping_ratio * 8.0 / oiled.distance_constant / 1.5
     for speed in (2.0, 12.0):
         natural = speed / oiled.distance_constant
         own = 2.0 * oiled.damping_ratio * natural / 1.5
 
-        def motion(t, state, natural=natural, own=own):
+        def motion(
+            t: float, state: FloatArray, natural: float = natural, own: float = own
+        ) -> list[float]:
             angle, turning = state
             pull = natural**2 / 1.5 * np.sin(angle - 0.3)
             return [turning, -(own + rate) * turning - pull]
@@ -211,11 +237,12 @@ def test_oil_in_the_bearing_damps_a_vane_by_as_much_in_any_wind():
         found = respond(Station(instruments=(oiled,)), Drive(START, 0.01, wind)).angles["vane"]
         expected = solve_ivp(motion, (0.0, 3.99), (0.0, 0.0), rtol=1e-8, dense_output=True)
         at = np.arange(1, 400) * 0.01
+        assert expected.sol is not None
         # The wind turns within the first interval.
         assert found.angle[1:400] == pytest.approx(expected.sol(at - 0.005)[0], abs=2e-3)
 
 
-def test_oil_in_the_bearing_holds_a_vane_against_its_mount():
+def test_oil_in_the_bearing_holds_a_vane_against_its_mount() -> None:
     oiled = vane(viscous_damping=3.0)
     n = 400
     angle, _ = integrate_vane(
@@ -227,7 +254,7 @@ def test_oil_in_the_bearing_holds_a_vane_against_its_mount():
     assert angle[-1] == pytest.approx(-np.arcsin(lag), rel=0.01)
 
 
-def test_finer_sampling_of_the_same_wind_gives_the_same_movement():
+def test_finer_sampling_of_the_same_wind_gives_the_same_movement() -> None:
     coarse = gusty(count=800)
     fine_time = np.arange(799 * 8 + 1) * coarse.dt / 8
     grid = np.arange(800) * coarse.dt
@@ -247,7 +274,7 @@ def test_finer_sampling_of_the_same_wind_gives_the_same_movement():
     assert turned == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_step_from_equilibrium_is_exponential_for_a_cup_without_lambda():
+def test_a_step_from_equilibrium_is_exponential_for_a_cup_without_lambda() -> None:
     """K94 (11): Lambda = 0 makes the step exactly 1 - exp(-t/tau0)."""
     drive = steady((8.0, 0.0, 0.0), count=200, dt=0.02)
     wind = drive.wind.copy()
@@ -264,14 +291,16 @@ def test_a_step_from_equilibrium_is_exponential_for_a_cup_without_lambda():
 
 @settings(max_examples=20)
 @given(st.floats(1.0, 20.0), st.floats(0.0, 0.9))
-def test_a_propeller_with_friction_settles_at_jacksons_steady_rate(speed, stall):
+def test_a_propeller_with_friction_settles_at_jacksons_steady_rate(
+    speed: float, stall: float
+) -> None:
     """J80 (6): P omega = U - U_s^2 / U."""
     station = Station(instruments=(vane(), propeller(mounted_on="vane", stall_speed=stall)))
     end = respond(station, steady((-speed, 0, 0))).rotors["propeller"].y[-1]
     assert end == pytest.approx(speed - stall**2 / speed, rel=1e-6)
 
 
-def test_three_fixed_propellers_with_cosine_response_show_the_wind_vector():
+def test_three_fixed_propellers_with_cosine_response_show_the_wind_vector() -> None:
     axes = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     station = Station(
         instruments=tuple(
@@ -287,7 +316,7 @@ def test_three_fixed_propellers_with_cosine_response_show_the_wind_vector():
 @pytest.mark.parametrize(
     "rotor", [propeller(axis=(1.0, 0.0, 0.0), mu2=-0.7), cup(mu1=1.2, a4=1.0), cup(mu1=1.2)]
 )
-def test_air_from_behind_brakes_a_rotor_and_never_drives_it_on(rotor):
+def test_air_from_behind_brakes_a_rotor_and_never_drives_it_on(rotor: Propeller | Cup) -> None:
     """Of which the models say nothing: a multirotor's stuck vane, a cup that falls fast."""
     wind = (-6.0, 2.0, 0.0) if isinstance(rotor, Propeller) else (0.1, 0.0, -12.0)
     turning = ResponseState(rotors={rotor.name: (100.0, 0.0)})
@@ -297,14 +326,16 @@ def test_air_from_behind_brakes_a_rotor_and_never_drives_it_on(rotor):
     assert y[-1] < 0.05 * y[0]
 
 
-def test_a_propeller_that_is_neither_mounted_nor_aimed_is_the_users_error():
+def test_a_propeller_that_is_neither_mounted_nor_aimed_is_the_users_error() -> None:
     with pytest.raises(UserError, match="neither `mounted_on` nor `axis`"):
         respond(Station(instruments=(propeller(),)), steady((5, 0, 0), 10))
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-0.6, 0.6))
 @settings(max_examples=20)
-def test_a_bivane_settles_on_azimuth_and_elevation_of_the_wind(azimuth, elevation):
+def test_a_bivane_settles_on_azimuth_and_elevation_of_the_wind(
+    azimuth: float, elevation: float
+) -> None:
     b = Bivane(
         name="bivane", azimuth=TOPIC, elevation=TOPIC, distance_constant=2.4, damping_ratio=0.5
     )
@@ -318,7 +349,7 @@ def test_a_bivane_settles_on_azimuth_and_elevation_of_the_wind(azimuth, elevatio
     assert found.angles["bivane/elevation"].angle[-1] == pytest.approx(elevation, abs=1e-4)
 
 
-def test_in_still_air_a_vane_keeps_its_heading_while_the_mount_turns():
+def test_in_still_air_a_vane_keeps_its_heading_while_the_mount_turns() -> None:
     count, dt = 400, 0.05
     t = dt * np.arange(count)
     yaw = 0.3 * (1.0 - np.cos(t))
@@ -331,7 +362,7 @@ def test_in_still_air_a_vane_keeps_its_heading_while_the_mount_turns():
     np.testing.assert_allclose(angle + yaw, angle[0], atol=1e-3)
 
 
-def test_a_leaning_cup_reads_its_angular_response():
+def test_a_leaning_cup_reads_its_angular_response() -> None:
     """The wind in cup axes by SciPy's rotation; forcing K14 (83)."""
     c = cup(tilt_deg=(6.0, -9.0), starting_speed=0.0)
     wind = np.array([5.0, 2.0, 0.0])
@@ -346,7 +377,7 @@ def test_a_leaning_cup_reads_its_angular_response():
 
 
 @pytest.mark.parametrize(("from_deg", "factor"), [(40.0, 0.8), (50.0, 1 - 0.2 * np.exp(-0.5))])
-def test_a_wake_slows_the_wind_that_comes_through_it(from_deg, factor):
+def test_a_wake_slows_the_wind_that_comes_through_it(from_deg: float, factor: float) -> None:
     c = cup(
         starting_speed=0.0,
         wake_shadows=(WakeShadow(bearing_from_deg=40.0, depth=0.2, width_deg=10.0),),
@@ -356,7 +387,7 @@ def test_a_wake_slows_the_wind_that_comes_through_it(from_deg, factor):
     assert end.rotors["cup"].y[-1] == pytest.approx(7.0 * factor, rel=1e-7)
 
 
-def test_the_wake_stands_still_on_the_mount_while_the_mount_turns():
+def test_the_wake_stands_still_on_the_mount_while_the_mount_turns() -> None:
     shadow = WakeShadow(bearing_from_deg=90.0, depth=0.3, width_deg=10.0)
     station = Station(
         instruments=(cup(starting_speed=0.0, wake_shadows=(shadow,)),), platform=Platform()
@@ -369,7 +400,7 @@ def test_the_wake_stands_still_on_the_mount_while_the_mount_turns():
         assert end.rotors["cup"].y[-1] == pytest.approx(3.5, rel=1e-6)
 
 
-def test_flow_distortion_is_a_fourier_series_of_the_direction_in_the_sensor_frame():
+def test_flow_distortion_is_a_fourier_series_of_the_direction_in_the_sensor_frame() -> None:
     d = FlowDistortion(cosine_1=0.05, sine_1=-0.03, cosine_2=0.02, sine_2=0.04)
     station = Station(
         instruments=(cup(starting_speed=0.0, flow_distortion=d),), sensor_heading_deg=25.0
@@ -387,7 +418,7 @@ def test_flow_distortion_is_a_fourier_series_of_the_direction_in_the_sensor_fram
 
 @given(st.floats(-3.0, 3.0))
 @settings(max_examples=10)
-def test_turning_wind_and_platform_together_turns_nothing(turn):
+def test_turning_wind_and_platform_together_turns_nothing(turn: float) -> None:
     drive = gusty(count=300)
     station = Station(
         instruments=(vane(), cup(tilt_deg=(3.0, 2.0))),
@@ -405,7 +436,7 @@ def test_turning_wind_and_platform_together_turns_nothing(turn):
     np.testing.assert_allclose(np.angle(np.exp(1j * difference)), 0.0, atol=1e-7)
 
 
-def test_a_boat_in_a_circle_feels_one_constant_wind():
+def test_a_boat_in_a_circle_feels_one_constant_wind() -> None:
     """Speed and direction that rotor and vane show, brought back to earth, stay the same."""
     count, dt, period, speed = 6000, 0.05, 300.0, 2.5
     t = dt * np.arange(count)
@@ -427,32 +458,32 @@ def test_a_boat_in_a_circle_feels_one_constant_wind():
     np.testing.assert_allclose(earth.mean(axis=0), (5.0, -3.0, 0.0), atol=0.01)
 
 
-def test_signals_with_the_motion_already_removed_show_the_wind_alone():
+def test_signals_with_the_motion_already_removed_show_the_wind_alone() -> None:
     station = Station(instruments=(cup(starting_speed=0.0),), platform=Platform(velocity_share=0.0))
     end = respond(station, steady((6, 0, 0), motion=at_rest(1200, (-4.0, 0.0, 0.0))))
     assert end.rotors["cup"].y[-1] == pytest.approx(6.0, rel=1e-7)
 
 
-def test_downwash_of_a_hovering_multirotor_is_a_vertical_wind():
+def test_downwash_of_a_hovering_multirotor_is_a_vertical_wind() -> None:
     c = cup(starting_speed=0.0, mu1=0.0, mu2=1.0)
     station = Station(instruments=(c,), platform=Platform(downwash=Downwash(induced_velocity=3.0)))
     end = respond(station, steady((0.001, 0, 0), 4000, motion=at_rest(4000)))
     assert end.rotors["cup"].y[-1] == pytest.approx(3.0, rel=1e-3)
 
 
-def test_thin_air_lets_friction_win_and_changes_nothing_else():
+def test_thin_air_lets_friction_win_and_changes_nothing_else() -> None:
     free, stiff = cup(starting_speed=0.0), cup(starting_speed=0.0, friction_speed=1.0)
-    thin = dict(density=np.full(1200, 0.6125))
-    unhurt = respond(Station(instruments=(free,)), steady((5, 0, 0), **thin)).rotors["cup"]
+    thin = np.full(1200, 0.6125)
+    unhurt = respond(Station(instruments=(free,)), steady((5, 0, 0), density=thin)).rotors["cup"]
     assert unhurt.y[-1] == pytest.approx(5.0, rel=1e-7)
     # (5 - y) (0.8 * 5 + 0.2 y) = U_s^2 rho0 / rho, solved by hand.
     b, c = 4.0 - 0.2 * 5.0, 2.0 - 20.0
     expected = (-b + np.sqrt(b * b - 4 * 0.2 * c)) / 0.4
-    slowed = respond(Station(instruments=(stiff,)), steady((5, 0, 0), **thin)).rotors["cup"]
+    slowed = respond(Station(instruments=(stiff,)), steady((5, 0, 0), density=thin)).rotors["cup"]
     assert slowed.y[-1] == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_bearing_that_sticks_lets_go_later_than_it_stops():
+def test_a_bearing_that_sticks_lets_go_later_than_it_stops() -> None:
     """A wind of 3.8 m/s does not start a rotor that it keeps going; Stribeck's curve by hand."""
     sticky = cup(starting_speed=0.0, friction_speed=2.0, friction_breakaway=3.0)
     count = 2400
@@ -468,7 +499,7 @@ def test_a_bearing_that_sticks_lets_go_later_than_it_stops():
         assert push == pytest.approx(4.0 * (1.0 + 2.0 * np.exp(-(turning**2))), rel=1e-3)
 
 
-def test_a_braked_propeller_stalls_at_once_and_starts_in_a_far_stronger_wind():
+def test_a_braked_propeller_stalls_at_once_and_starts_in_a_far_stronger_wind() -> None:
     """A wind that keeps it going slowly does not start it; the torque of stalled blades by hand."""
     braked = propeller(axis=(1.0, 0.0, 0.0), friction_speed=2.0, friction_breakaway=4.0)
     count = 2400
@@ -491,7 +522,7 @@ def test_a_braked_propeller_stalls_at_once_and_starts_in_a_far_stronger_wind():
     assert smooth.rotors["propeller"].y[-1] == pytest.approx(3.0 - 4.0 / 3.0, rel=1e-3)
 
 
-def test_a_change_in_the_middle_is_the_healthy_run_and_then_the_changed_one():
+def test_a_change_in_the_middle_is_the_healthy_run_and_then_the_changed_one() -> None:
     drive = gusty(count=500)
     changed = Station(
         instruments=(vane(), cup()),
@@ -518,7 +549,7 @@ def test_a_change_in_the_middle_is_the_healthy_run_and_then_the_changed_one():
     np.testing.assert_array_equal(whole.angles["vane"].angle, phi)
 
 
-def test_a_change_of_a_key_that_does_not_exist_is_the_users_error():
+def test_a_change_of_a_key_that_does_not_exist_is_the_users_error() -> None:
     station = Station(
         instruments=(cup(),), changes=(Change(start=0.0, instrument="cup", set={"gian": 1.0}),)
     )
@@ -526,7 +557,7 @@ def test_a_change_of_a_key_that_does_not_exist_is_the_users_error():
         respond(station, steady((5, 0, 0), 10))
 
 
-def test_an_unequal_rotor_pulses_once_per_turn_and_its_mean_speed_stays():
+def test_an_unequal_rotor_pulses_once_per_turn_and_its_mean_speed_stays() -> None:
     plain = respond(Station(instruments=(cup(starting_speed=0.0),)), steady((6, 0, 0)))
     uneven = respond(
         Station(instruments=(cup(starting_speed=0.0, torque_harmonic=0.1),)), steady((6, 0, 0))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +27,7 @@ from wind_sensors.simulation import (
     respond,
     simulate,
 )
+from wind_sensors.simulation.blocks import SignalBlock
 from wind_sensors.simulation.transport import events_of, live_events, received
 from wind_sensors.station.model import (
     Air,
@@ -44,7 +48,7 @@ from wind_sensors.turbulence import von_karman
 from wind_sensors.turbulence.synthesis import isotropic_spec
 
 
-def station(moving: bool = False, **keys) -> Station:
+def station(moving: bool = False, **keys: Any) -> Station:
     instruments = (
         Vane(
             name="vane", joint_states=Input(topic="/vane"), distance_constant=0.5,
@@ -69,31 +73,34 @@ def station(moving: bool = False, **keys) -> Station:
     )
 
 
-def scenario(**changes) -> Scenario:
+def scenario(**changes: Any) -> Scenario:
     wind = isotropic_spec(7.0, 0.15, 40.0, direction=0.8, seed=changes.get("seed", 0))
     return replace(Scenario(wind, duration=35.0), **changes)
 
 
-def arrays(recording: Recording) -> dict[str, np.ndarray]:
-    out = {f"p/{n}": p.time for n, p in recording.pulses.items()}
+def arrays(recording: Recording | SignalBlock) -> dict[str, np.ndarray]:
+    out: dict[str, np.ndarray] = {f"p/{n}": p.time for n, p in recording.pulses.items()}
     for n, a in recording.angles.items():
         out |= {f"a/{n}/t": a.time, f"a/{n}": a.angle}
     for name in ("reference", "truth"):
         out[name] = getattr(recording, name).velocity
+    assert recording.temperature is not None
     out["temperature"] = recording.temperature.value
     if recording.platform is not None:
         out |= {"q": recording.platform.attitude, "v": recording.platform.velocity}
     return out
 
 
-def joined_blocks(blocks) -> dict[str, np.ndarray]:
+def joined_blocks(blocks: Iterable[SignalBlock]) -> dict[str, np.ndarray]:
     parts = [arrays(b) for b in blocks]
     return {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
 
 
 @pytest.mark.parametrize("carrier", [None, "boat", "multirotor"])
 @pytest.mark.parametrize("step", [0.37, 4.0, 31.0])
-def test_a_stream_read_in_any_steps_gives_the_bits_of_the_whole(carrier, step):
+def test_a_stream_read_in_any_steps_gives_the_bits_of_the_whole(
+    carrier: str | None, step: float
+) -> None:
     trajectory = None if carrier is None else CARRIERS[carrier](seed=2)
     s = station(
         moving=carrier is not None,
@@ -107,7 +114,7 @@ def test_a_stream_read_in_any_steps_gives_the_bits_of_the_whole(carrier, step):
         np.testing.assert_array_equal(pieces[name], values, err_msg=name)
 
 
-def test_the_seed_decides_everything_and_another_seed_another_thing():
+def test_the_seed_decides_everything_and_another_seed_another_thing() -> None:
     one, same = arrays(simulate(station(), scenario())), arrays(simulate(station(), scenario()))
     other = arrays(simulate(station(), scenario(seed=1)))
     for name, values in one.items():
@@ -116,24 +123,26 @@ def test_the_seed_decides_everything_and_another_seed_another_thing():
         assert not np.array_equal(one[name], other[name]), name
 
 
-def test_rates_and_ends_are_those_asked_for():
+def test_rates_and_ends_are_those_asked_for() -> None:
     recording = simulate(
         station(), scenario(duration=33.3, vane_rate=8.0, reference_rate=10.0, air_rate=0.5)
     )
     assert recording.stop - recording.start == 33_300_000_000
     vane = recording.angles["vane"].time
     np.testing.assert_allclose(np.diff(vane) * 1e-9, 0.125, atol=2e-9)
+    assert recording.reference is not None and recording.temperature is not None
     assert len(vane) == 267 and len(recording.reference.time) == 333
     assert len(recording.temperature.time) == 17
     assert recording.pulses["cup"].time.max() < recording.stop
 
 
-def test_the_reference_differs_from_the_sensors_wind_by_the_structure_function():
+def test_the_reference_differs_from_the_sensors_wind_by_the_structure_function() -> None:
     """0.5 m across an isotropic field: increments of variance D_L to D_T of that distance."""
     s = station().model_copy(
         update={"reference": Reference(topic=Input(topic="/r"), separation=0.5, noise=0.0)}
     )
     found = simulate(s, scenario(duration=600.0))
+    assert found.reference is not None and found.truth is not None
     spread = np.var(found.reference.velocity - found.truth.velocity, axis=0).mean()
     sigma, q = 0.15 * 7.0, von_karman.wavenumber_from_integral_length(40.0)
     along = float(von_karman.longitudinal_structure_function(0.5, sigma**2, q))
@@ -145,10 +154,11 @@ def test_the_reference_differs_from_the_sensors_wind_by_the_structure_function()
 
 
 @pytest.mark.parametrize("towards", [0.0, np.pi])
-def test_a_robot_meets_gusts_at_its_speed_through_the_air(towards):
+def test_a_robot_meets_gusts_at_its_speed_through_the_air(towards: float) -> None:
     """Taylor in the earth frame: increments over 0.2 s are those over |U - V| 0.2 s."""
     drive = Trajectory(speed=4.0, course=0.8 + towards)
     found = simulate(station(moving=True), scenario(duration=600.0, trajectory=drive))
+    assert found.truth is not None
     steps = found.truth.velocity[4:] - found.truth.velocity[:-4]
     pace = 7.0 - 4.0 * np.cos(towards)
     sigma, q = 0.15 * 7.0, von_karman.wavenumber_from_integral_length(40.0)
@@ -159,13 +169,14 @@ def test_a_robot_meets_gusts_at_its_speed_through_the_air(towards):
 
 
 @pytest.mark.parametrize("carrier", sorted(CARRIERS))
-def test_attitude_rates_velocity_and_position_of_a_carrier_fit_together(carrier):
+def test_attitude_rates_velocity_and_position_of_a_carrier_fit_together(carrier: str) -> None:
     trajectory = CARRIERS[carrier](seed=5)
     found = simulate(
         station(moving=True),
         scenario(trajectory=trajectory, platform_noise=False, sample_rate=100.0,
                  platform_rate=100.0, duration=130.0),
     ).platform  # fmt: skip
+    assert found is not None
     q = Rotation.from_quat(found.attitude)
     turned = (q[:-2].inv() * q[2:]).as_rotvec() / 0.02
     assert np.abs(turned - found.angular_rate[1:-1]).max() < 2e-2
@@ -185,7 +196,7 @@ ERRORS = Platform(
 
 
 @pytest.mark.parametrize("platform", [None, ERRORS])
-def test_the_recorded_motion_drives_the_same_pulses_again(platform):
+def test_the_recorded_motion_drives_the_same_pulses_again(platform: Platform | None) -> None:
     keys = {} if platform is None else {"platform": platform}
     s = station(moving=True, **keys)
     found = simulate(
@@ -198,7 +209,7 @@ def test_the_recorded_motion_drives_the_same_pulses_again(platform):
     assert np.abs(edges[:both] - recorded[:both]).max() < 20_000
 
 
-def test_a_platform_clock_that_is_late_is_undone():
+def test_a_platform_clock_that_is_late_is_undone() -> None:
     late = Platform(odometry=Input(topic="/odom"), clock=Clock(latency=0.4))
     s = station(moving=True, platform=late)
     found = simulate(
@@ -215,8 +226,9 @@ def test_a_platform_clock_that_is_late_is_undone():
     assert error["on time"] > 3.0 * error["late"]
 
 
-def test_a_measured_wind_blows_again():
+def test_a_measured_wind_blows_again() -> None:
     first = simulate(station(), scenario(duration=40.0))
+    assert first.truth is not None
     again = simulate(station(), Scenario(first.truth, duration=39.0))
     known = first.pulses["cup"].time
     found = again.pulses["cup"].time
@@ -225,10 +237,11 @@ def test_a_measured_wind_blows_again():
         simulate(station(), Scenario(first.truth, duration=60.0))
 
 
-def test_following_a_track_moves_as_it_did_and_ends_where_it_ends():
+def test_following_a_track_moves_as_it_did_and_ends_where_it_ends() -> None:
     s = station(moving=True)
     first = simulate(s, scenario(trajectory=CARRIERS["rover"](), platform_noise=False))
     again = simulate(s, scenario(trajectory=first.platform, platform_noise=False, duration=30.0))
+    assert first.platform is not None and again.platform is not None
     count = len(again.platform.time)
     np.testing.assert_allclose(again.platform.velocity, first.platform.velocity[:count], atol=1e-9)
     with pytest.raises(UserError, match="ends after"):
@@ -236,7 +249,7 @@ def test_following_a_track_moves_as_it_did_and_ends_where_it_ends():
 
 
 @pytest.mark.parametrize("clock", [Clock(), Clock(latency=-0.3), Clock(latency=0.3, drift=1e-3)])
-def test_live_messages_are_those_of_the_recording_in_the_same_order(clock):
+def test_live_messages_are_those_of_the_recording_in_the_same_order(clock: Clock) -> None:
     s = station()
     s = s.model_copy(
         update={"instruments": tuple(i.model_copy(update={"clock": clock}) for i in s.instruments)}
@@ -254,7 +267,7 @@ def test_live_messages_are_those_of_the_recording_in_the_same_order(clock):
         np.testing.assert_array_equal(a.values, b.values)
 
 
-def test_faults_have_their_stated_shares_and_touch_nothing_else():
+def test_faults_have_their_stated_shares_and_touch_nothing_else() -> None:
     whole = simulate(station(), scenario(duration=300.0))
     plain = {(e.source, e.number): e for e in events_of(whole)}
     faults = TransportFaults(loss=0.1, doubling=0.2, jitter=0.05, not_a_number=0.1)
@@ -273,10 +286,11 @@ def test_faults_have_their_stated_shares_and_touch_nothing_else():
         if not np.isnan(e.values).any():
             assert e.values == original.values
     truth = [e for e in found if e.source == "truth"]
+    assert whole.truth is not None
     assert len(truth) == len(whole.truth.time)
 
 
-def test_a_clock_jumps_once_and_a_counter_wraps():
+def test_a_clock_jumps_once_and_a_counter_wraps() -> None:
     whole = simulate(station(), scenario())
     faults = TransportFaults(clock_jump_at=20.0, clock_jump=-5.0, counter_modulus=16)
     found = [e for e in events_of(whole, faults) if e.source == "pulses/cup"]
@@ -287,7 +301,7 @@ def test_a_clock_jumps_once_and_a_counter_wraps():
     assert [e.number for e in found] == [k % 16 for k in range(len(found))]
 
 
-def test_a_logger_behind_faults_keeps_the_counts_of_its_counter():
+def test_a_logger_behind_faults_keeps_the_counts_of_its_counter() -> None:
     s = station()
     counting = s.instrument("cup").model_copy(
         update={"pulses": Input(topic="/cup", meaning="count"), "electronics": Electronics()}
@@ -297,29 +311,33 @@ def test_a_logger_behind_faults_keeps_the_counts_of_its_counter():
     found = received(whole, TransportFaults(loss=0.3)).pulses["cup"]
     assert len(found.time) < len(whole.pulses["cup"].time)
     numbers = np.searchsorted(whole.pulses["cup"].time, found.time)
+    assert found.turns is not None
     np.testing.assert_allclose(found.turns, (numbers + 1) / 4)
 
 
-def test_a_scenario_that_does_not_fit_the_station_is_the_users_error():
+def test_a_scenario_that_does_not_fit_the_station_is_the_users_error() -> None:
     with pytest.raises(UserError, match="mast"):
         simulate(station(), scenario(trajectory=Trajectory()))
     with pytest.raises(UserError, match="wind cannot be made"):
         simulate(station(), Scenario(isotropic_spec(-1.0, 0.1, 50.0)))
 
 
-def test_a_bivane_signals_both_angles():
+def test_a_bivane_signals_both_angles() -> None:
     b = Bivane(
         name="bivane", azimuth=Input(topic="/az"), elevation=Input(topic="/el"),
         distance_constant=2.4, damping_ratio=0.3,
     )  # fmt: skip
     found = simulate(station(instruments=(b,)), scenario(duration=120.0))
     elevation = found.angles["bivane/elevation"].angle
+    assert found.truth is not None
     w_over_h = found.truth.velocity[:, 2] / np.hypot(*found.truth.velocity[:, :2].T)
     assert np.corrcoef(elevation, w_over_h)[0, 1] > 0.5
     assert found.angles["bivane"].time.size == elevation.size
 
 
-def test_the_command_writes_what_was_simulated(tmp_path, capsys):
+def test_the_command_writes_what_was_simulated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "simulated"
     command = ["simulate", "mast_cup_vane", "-o", str(out), "--duration", "20s", "--seed", "4"]
     assert main([*command, "--direction-from", "200", "--surface-layer"]) == 0
@@ -333,7 +351,9 @@ def test_the_command_writes_what_was_simulated(tmp_path, capsys):
     assert main([*command, "--carrier", "boat", "--force"]) == 2, "a mast does not sail"
 
 
-def test_a_rate_that_would_fill_the_memory_is_refused(tmp_path, capsys):
+def test_a_rate_that_would_fill_the_memory_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     command = ["simulate", "mast_cup_vane", "-o", str(tmp_path / "s"), "--duration", "20s"]
     with pytest.raises(SystemExit) as stopped:
         main([*command, "--rate", "1e7"])

@@ -105,7 +105,7 @@ def test_no_net_loss_at_zeta_0(slope: float) -> None:
     assert float(vane.gain(edge, zeta)) == pytest.approx(1.0, rel=1e-12)
 
     def beyond(s: float) -> float:
-        return (1.0 - 1.0 / float(vane.inverse_gain_squared(s, zeta))) * s**-slope
+        return (1.0 - 1.0 / float(vane.inverse_gain_squared(s, zeta))) * math.pow(s, -slope)
 
     area = integrate.quad(beyond, edge, 20.0)[0] + integrate.quad(beyond, 20.0, math.inf)[0]
     expected = (slope - 1.0) * edge ** (slope - 1.0) * area
