@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,11 @@ from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect, entry_of
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
 from wind_sensors.diagnosis.explaining.fitting import Fit
-from wind_sensors.diagnosis.explaining.guesses import guesses_of, hidden_by_a_dead_log
+from wind_sensors.diagnosis.explaining.guesses import (
+    deaf_rotors,
+    guesses_of,
+    hidden_by_a_dead_log,
+)
 from wind_sensors.diagnosis.explaining.naming import (
     name,
     named_alone,
@@ -263,8 +267,9 @@ def diagnose(
             if key[0] in known
         }
         return searcher_of(
-            seen, baseline, known, guesses, workers, report("simulating the catalogue")
-        )
+            replace(seen, deaf=deaf_rotors(guesses)), baseline, known, guesses, workers,
+            report("simulating the catalogue"),
+        )  # fmt: skip
 
     dead_log = [term for term in hidden_by_a_dead_log(comparison) if term.effect.name in known]
     searcher, naming = _explained(comparison, search, dead_log, report)

@@ -92,6 +92,9 @@ class Comparison(View):
         debounced: Pulses without bounces of the rotors whose contacts bounce. Bounces show one by
             one, so that the series, recorded and simulated, do without them; in the spectra and
             statistics they stay.
+        deaf: Rotors whose counter is deaf for a while after each pulse. Which pulse it takes of
+            those that come sooner hangs on hundredths of a millisecond, and makes its rate jump:
+            its quick eddies tell nothing.
         moving: The mount that moves, in a wind without eddies; None on a mast.
     """
 
@@ -102,6 +105,7 @@ class Comparison(View):
     memory: DriveMemory | None = field(default=None, repr=False, compare=False)
     repeated: float = 0.0
     debounced: Mapping[str, Pulses] = field(default_factory=dict, repr=False)
+    deaf: frozenset[str] = frozenset()
     moving: Moving | None = field(default=None, repr=False)
     _simulated: Memory = field(
         default_factory=lambda: Memory(SIMULATIONS), init=False, repr=False, compare=False
@@ -356,7 +360,10 @@ class Comparison(View):
             and resolved(entry.pulses, "pulses").meaning != "angle"
         ]
         electronics = [rotor.electronics for rotor in rotors]
-        return any(e.bounce_probability > 0.0 or e.loss_probability > 0.0 for e in electronics)
+        return any(
+            e.bounce_probability > 0.0 or e.loss_probability > 0.0 or e.dead_time > 0.0
+            for e in electronics
+        )
 
     def _reaching(self, station: Station, instrument: str) -> tuple[str, ...]:
         """Instruments on which the signals of one depend: itself and what carries it."""

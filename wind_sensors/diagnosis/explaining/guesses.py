@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,19 @@ def hidden_by_a_dead_log(comparison: Comparison) -> list[Term]:
     if log_lives(comparison.drive, *window_of(comparison, still.interval)):
         still = replace(still, interval=interval_of(comparison, *silent))
     return [still]
+
+
+def deaf_rotors(guesses: Mapping[tuple[str, str], Sequence[Term]]) -> frozenset[str]:
+    """Rotors whose pulses tell of a dead time.
+
+    Args:
+        guesses: Effects that the raw signals suggest, by effect and instrument.
+    """
+    return frozenset(
+        instrument
+        for (effect, instrument), terms in guesses.items()
+        if effect == "missed_pulses" and any("dead_time" in term.held for term in terms)
+    )
 
 
 def guesses_of(comparison: Comparison, station: Station) -> Guesses:

@@ -63,6 +63,12 @@ SHARP = 6.0
 """A counter's dead time shows if so many times as many intervals lie just above the shortest,
 within this share of it, as below: a fit of the whole signal would trade it for another gain."""
 
+PASSED = 1.3
+LEAST_PASSED = 500
+LOST_BESIDE = 0.002
+"""Pulses are lost beside a dead time if more than this share is, of so many intervals at least that
+should have been so many times as long as it."""
+
 APART = 5.0
 """Bounces tell their delay if so many times as many intervals are shorter than three tenths of the
 usual one as between that and four tenths: a fit would trade it for another rate."""
@@ -151,6 +157,7 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     short = float(np.mean(relative < 0.4))
     usual_long = float(np.mean(usual[1:] > 1.6 * usual[:-1]))
     dead = _dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual))
+    dead = [_without_chance(term, relative > 1.6, local, usual_long) for term in dead]
     if long > 0.004 + 2.0 * usual_long and not any(term.held for term in dead):
         per_turn = 2.0 * np.pi * rotor.calibration_distance / rotor.pulses_per_revolution
         speed = per_turn / np.maximum(local, 1e-9)
@@ -182,6 +189,28 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         uneven = suggested("encoder_slot_error", rotor.name, **slot_values(told))
         out.append(replace(uneven, interval=holds))
     return out
+
+
+def _without_chance(
+    term: Term, long: npt.NDArray[np.bool_], usual: FloatArray, usual_long: float
+) -> Term:
+    """A told dead time alone, where no pulses are lost at rates that it lets pass.
+
+    Beside another effect a thousandth of losses that are not there follows the steps that pulses
+    make of the cost, and the other effect stops short of its size.
+
+    Args:
+        term: A dead time.
+        long: Which intervals are too long for their time.
+        usual: What they should be [s].
+        usual_long: Share of long ones where none is lost.
+    """
+    passed = long[usual > PASSED * term.values["dead_time"]]
+    if not term.held or passed.size < LEAST_PASSED:
+        return term
+    if passed.mean() > LOST_BESIDE + 2.0 * usual_long:
+        return term
+    return replace(term, held=term.held | {"loss_probability", "loss_growth"})
 
 
 def _losses_by_chance(rotor: Rotor, long: npt.NDArray[np.bool_], speed: FloatArray) -> Term:

@@ -13,6 +13,7 @@ from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.comparison import LOW_END, Comparison, Trust
 from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
+from wind_sensors.diagnosis.comparing.raw_statistics.changes import CHANGES
 from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, chance_of_intervals
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     ERRATIC,
@@ -85,14 +86,18 @@ def _trust(
     # their noise is that of a whole record, beside which they are smaller.
     share = comparison.counted_share
     usual = known.statistics_deviation_in(mean_speed) / np.sqrt(share)
+    statistics = np.hypot(usual, by_chance)
+    sampling = activity.sampling_variance(channel, mean_speed, comparison.grid)
+    activities = known.activity_deviation(sampling)
+    if channel.instrument in comparison.deaf:
+        statistics[:BANDS] = statistics[-CHANGES:] = np.inf
+        activities = np.full_like(activities, np.inf)
     return Trust(
         slope=slope,
         deviation=np.sqrt(variance / share + SMALLEST_DEVIATION**2),
         statistics_mean=known.statistics_mean,
-        statistics_deviation=np.hypot(usual, by_chance),
-        activity_deviation=known.activity_deviation(
-            activity.sampling_variance(channel, mean_speed, comparison.grid)
-        ),
+        statistics_deviation=statistics,
+        activity_deviation=activities,
     )
 
 
