@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
 from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.guesses import (
-    deaf_rotors,
+    as_counted,
     guesses_of,
     hidden_by_a_dead_log,
 )
@@ -267,7 +267,7 @@ def diagnose(
             if key[0] in known
         }
         return searcher_of(
-            replace(seen, deaf=deaf_rotors(guesses)), baseline, known, guesses, workers,
+            as_counted(seen, guesses), baseline, known, guesses, workers,
             report("simulating the catalogue"),
         )  # fmt: skip
 

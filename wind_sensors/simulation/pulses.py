@@ -331,12 +331,15 @@ class PulseCircuit:
             turns.append(numbers[kept] / now.pulses_per_revolution)
         return Pulses(np.concatenate(time), np.concatenate(turns))
 
-    def expected(self, slots: Sequence[PassedSlots], bounces: bool = True) -> Pulses:
+    def expected(
+        self, slots: Sequence[PassedSlots], bounces: bool = True, losses: bool = True
+    ) -> Pulses:
         """What the logger records on average: every edge, for as many as chance makes of it.
 
         Args:
             slots: Those that passed.
             bounces: Whether edges that bounce count more than once.
+            losses: Whether edges that chance takes are missing.
         """
         time, weights = [], []
         for passed in slots:
@@ -350,8 +353,8 @@ class PulseCircuit:
             longest = LONGEST_BOUNCE * electronics.bounce_delay
             heard = max(1.0 - electronics.dead_time / longest, 0.0)
             bounced = electronics.bounce_probability * heard if bounces else 0.0
-            lost = passed.lost()
-            if electronics.loss_growth > 0.0 and passed.times.size:
+            lost = passed.lost() if losses else np.zeros(1)
+            if losses and electronics.loss_growth > 0.0 and passed.times.size:
                 # Those that an outage takes leave fewer edges than passed.
                 lost = np.interp(part, stamps(rotor.clock, passed.times, self._origin), lost)
             in_time = share_in_time(part, electronics.dead_time)
@@ -422,12 +425,12 @@ def expected_signals(response: Response, name: str, bounces: bool = True) -> Pul
 
 
 def signals_and_expected(
-    response: Response, name: str, bounces: bool = True
+    response: Response, name: str, bounces: bool = True, losses: bool = True
 ) -> tuple[Pulses, Pulses]:
     """`rotor_signals` and `expected_signals`, for hardly more than one of them takes."""
     slots, origin = passed_slots(response, name), _origin(response)
     drawn = PulseCircuit(name, origin, 0).signals(slots)
-    return drawn, PulseCircuit(name, origin, 0).expected(slots, bounces)
+    return drawn, PulseCircuit(name, origin, 0).expected(slots, bounces, losses)
 
 
 def _origin(response: Response) -> int:

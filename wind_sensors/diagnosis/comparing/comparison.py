@@ -122,7 +122,7 @@ class Comparison(View):
     def measuring(self) -> Comparison:
         """The same comparison with what is seen of the recording."""
         pulses, angles = self.recording.pulses, self.recording.angles
-        measured = self.observe(pulses, angles, self.debounced)
+        measured = self.observe(pulses, angles, {**self.debounced, **self.mended})
         for channel in self.channels:
             if channel.kind == "vane_angle":
                 measured = self._completed(measured, channel)
@@ -347,8 +347,9 @@ class Comparison(View):
     def _drawn_and_expected(self, station: Station, rotor: str) -> Simulated:
         """What is seen of a rotor of whose edges chance takes or doubles some."""
         response = self._at_speed(self.respond(station, (rotor,)), rotor)
-        bounces = rotor not in self.debounced
-        drawn, expected = signals_and_expected(response, rotor, bounces)
+        drawn, expected = signals_and_expected(
+            response, rotor, rotor not in self.debounced, rotor not in self.mended
+        )
         return self.observe({rotor: drawn}, {}, {rotor: expected})
 
     def _by_chance(self, station: Station, instrument: str) -> bool:

@@ -136,6 +136,8 @@ class View:
         expected: Deviation of each vane from `direction` that is expected [rad], by channel name.
             Deviations are counted on the turn that lies nearest to it.
         departure: Slow departure of a vane that stays far from there [rad], by channel name.
+        mended: Pulses of the rotors that lose some of them by chance, with those put back. All but
+            the statistics of intervals, recorded and simulated, is seen with them.
     """
 
     station: Station
@@ -147,6 +149,7 @@ class View:
     mask: FloatArray | None = None
     expected: Mapping[str, FloatArray] = field(default_factory=dict)
     departure: Mapping[str, FloatArray] = field(default_factory=dict)
+    mended: Mapping[str, Pulses] = field(default_factory=dict, repr=False)
 
     @property
     def coefficients(self) -> int:
@@ -229,7 +232,8 @@ class View:
     def _rotor(self, channel: Channel, pulses: Pulses, on_average: Pulses | None) -> Simulated:
         rotor = self.station.instrument(channel.instrument)
         assert isinstance(rotor, Rotor)
-        drawn = rate_series(pulses, rotor, self.grid)
+        whole = pulses if on_average is None or rotor.name not in self.mended else on_average
+        drawn = rate_series(whole, rotor, self.grid)
         series, cosine = drawn, self._cosine(drawn)
         statistics = (
             self._log_spectrum(cosine, self.grid.dt, channel, HIGHEST_OF_RATES),
@@ -238,7 +242,7 @@ class View:
             ),
             change_statistics(drawn, self._windy_changes),
         )
-        if on_average is None:
+        if on_average is None or whole is on_average:
             return self._of_one(channel, series, cosine, statistics, drawn)
         series = rate_series(on_average, rotor, self.grid)
         cosine = self._cosine(series)

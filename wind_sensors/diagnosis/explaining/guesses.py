@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import with_missed
 from wind_sensors.diagnosis.effects.definition import PLATFORM, STATION
 from wind_sensors.diagnosis.effects.platform import dead_log, log_lives
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
@@ -20,7 +21,8 @@ from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
 
 FloatArray = npt.NDArray[np.float64]
-Guesses = dict[tuple[str, str], list[Term]]
+Key = tuple[str, str]
+Guesses = dict[Key, list[Term]]
 
 LEAN = 15.0
 """Lean of the axis [deg] from which its fit begins: what it does to a rotor grows with its square,
@@ -54,17 +56,28 @@ def hidden_by_a_dead_log(comparison: Comparison) -> list[Term]:
     return [still]
 
 
-def deaf_rotors(guesses: Mapping[tuple[str, str], Sequence[Term]]) -> frozenset[str]:
-    """Rotors whose pulses tell of a dead time.
+def as_counted(comparison: Comparison, guesses: Mapping[Key, Sequence[Term]]) -> Comparison:
+    """The comparison that knows of which rotors pulses are lost, and how.
 
     Args:
-        guesses: Effects that the raw signals suggest, by effect and instrument.
+        comparison: The recording.
+        guesses: Effects that its raw signals suggest, by effect and instrument.
     """
-    return frozenset(
-        instrument
-        for (effect, instrument), terms in guesses.items()
-        if effect == "missed_pulses" and any("dead_time" in term.held for term in terms)
-    )
+    deaf, mended = set(), {}
+    for (effect, instrument), terms in guesses.items():
+        if effect != "missed_pulses":
+            continue
+        if any("dead_time" in term.held for term in terms):
+            deaf.add(instrument)
+            continue
+        rotor = comparison.station.instrument(instrument)
+        pulses = comparison.recording.pulses[instrument]
+        if isinstance(rotor, Rotor) and any("loss_growth" in term.held for term in terms):
+            mended[instrument] = with_missed(pulses, rotor.pulses_per_revolution)
+    told = {name: pulses for name, pulses in mended.items() if pulses is not None}
+    if not told and not deaf:
+        return comparison
+    return replace(comparison, mended=told, deaf=frozenset(deaf)).measuring()
 
 
 def guesses_of(comparison: Comparison, station: Station) -> Guesses:

@@ -63,6 +63,12 @@ SHARP = 6.0
 """A counter's dead time shows if so many times as many intervals lie just above the shortest,
 within this share of it, as below: a fit of the whole signal would trade it for another gain."""
 
+PARTS_OF_LOSSES = 8
+UNSTEADY = 4.0
+UNSTEADY_SHARE = 0.5
+"""Pulses are not lost all the time if their number in such a part of the record differs from what
+is expected by so many times what chance makes and by this share."""
+
 PASSED = 1.3
 LEAST_PASSED = 500
 LOST_BESIDE = 0.002
@@ -216,6 +222,8 @@ def _without_chance(
 def _losses_by_chance(rotor: Rotor, long: npt.NDArray[np.bool_], speed: FloatArray) -> Term:
     """Random losses, as often as intervals are long; growing with the rate where these do.
 
+    How they grow the intervals tell if pulses are lost all the time.
+
     Args:
         rotor: Gives the pulses.
         long: Which intervals are too long for their time.
@@ -229,11 +237,31 @@ def _losses_by_chance(rotor: Rotor, long: npt.NDArray[np.bool_], speed: FloatArr
     if seldom > 0.0 and often - seldom > GROWS * error:
         faster = float(speed[fast].mean() / speed[~fast].mean())
         growth = min(float(np.log(often / seldom) / np.log(faster)), MOST_GROWTH)
-    grown = float(np.mean((speed / LOSS_SPEED) ** growth))
-    return suggested(
+    lost = (speed / LOSS_SPEED) ** growth
+    grown = float(np.mean(lost))
+    found = suggested(
         "missed_pulses", rotor.name,
         dead_time=0.0, loss_probability=min(share / grown, 0.6), loss_growth=growth,
     )  # fmt: skip
+    steady = _is_steady(long, lost * share / grown)
+    return replace(found, held=frozenset({"loss_growth"}) if steady else frozenset())
+
+
+def _is_steady(long: npt.NDArray[np.bool_], expected: FloatArray) -> bool:
+    """Whether pulses are lost about as often as expected in each part of the record.
+
+    Args:
+        long: Which intervals are too long for their time.
+        expected: Chance of each that it is.
+    """
+    for seen, chance in zip(
+        np.array_split(long, PARTS_OF_LOSSES), np.array_split(expected, PARTS_OF_LOSSES),
+        strict=True,
+    ):  # fmt: skip
+        wanted, away = float(chance.sum()), float(seen.sum() - chance.sum())
+        if abs(away) > max(UNSTEADY * np.sqrt(wanted + 1.0), UNSTEADY_SHARE * wanted):
+            return False
+    return True
 
 
 def _uneven_span(comparison: Comparison, seen: SlotIntervals) -> Interval:

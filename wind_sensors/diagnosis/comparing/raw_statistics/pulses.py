@@ -42,6 +42,12 @@ LONGEST_WAIT = 5.0
 """But not if for this share of those that lie too close or more edges are missing elsewhere, in
 gaps of no more than so many seconds."""
 
+MISSED_TOGETHER = 3
+"""No more pulses in a row are put back: where more are missing the rotor may have stood still."""
+
+MOST_PUT_BACK = 0.07
+"""Of more missing edges some hide each other."""
+
 BURST_SECONDS = 1.0
 BURST_NEIGHBOURS = 61
 FEWEST_IN_BURSTS = 30
@@ -117,6 +123,38 @@ def without_bounces(pulses: Pulses, slots: int) -> Pulses | None:
     if np.sum(interval[waits] / usual[waits] - 1.0) > MADE_UP_FOR * np.count_nonzero(bounced):
         return None
     return Pulses(kept)
+
+
+def with_missed(pulses: Pulses, slots: int) -> Pulses | None:
+    """Pulses with those put back that are missing one by one, where they should have come.
+
+    A missing edge came midway between those a turn before and after it, so that slots in the wrong
+    places stay there, or midway between its neighbours where one of these is missing, too.
+
+    Args:
+        pulses: Edges, each a turn of the disc by one slot.
+        slots: Per turn.
+
+    Returns:
+        None: nobody can tell, for the edges are few, some bounce as well, or more are missing than
+        leave their neighbours in place.
+    """
+    if pulses.turns is not None or pulses.time.size < FEWEST_TO_TELL:
+        return None
+    time = np.sort(pulses.time, kind="stable")
+    tracked, bounced = by_slot((time - time[0]) * 1e-9, slots)
+    missed = np.isnan(tracked)
+    label = np.cumsum(np.diff(missed.astype(np.int8), prepend=np.int8(0)) != 0)
+    alone = np.bincount(label)[label] <= MISSED_TOGETHER
+    if np.mean(bounced) > BOUNCES or np.mean(missed & alone) > MOST_PUT_BACK:
+        return None
+    place = np.arange(tracked.size)
+    whole = np.interp(place, place[~missed], tracked[~missed])
+    a_turn = 0.5 * (tracked[: -2 * slots] + tracked[2 * slots :])
+    inner = slice(slots, -slots)
+    whole[inner] = np.where(missed[inner] & np.isfinite(a_turn), a_turn, whole[inner])
+    kept = whole[~missed | alone]
+    return Pulses(time[0] + np.rint(np.maximum.accumulate(kept) * 1e9).astype(np.int64))
 
 
 def bursts_of_bounces(pulses: Pulses, slots: int, begin: int, end: int) -> tuple[float, float]:
