@@ -30,6 +30,12 @@ LONGEST_BOUNCE = 2.0
 CLOSE = 1e-6
 """A Newton step this small leaves an error of the order of its square, far below a nanosecond."""
 
+UNSURE = 0.03
+"""Of a rotor's rate from pulse to pulse [1], where a reference half a metre away tells the wind."""
+
+MOST_SKIPPED = 50
+"""Of more edges in a row that a dead time takes nobody needs the exact share."""
+
 MOST_EDGES = 50_000_000
 """Edges of one response, 0.8 GB of them: a rotor at a hundred a second for six days."""
 
@@ -190,12 +196,6 @@ def share_in_time(times: TimeArray, dead_time: float) -> FloatArray:
         share[near] -= (1.0 / k - 1.0 / (k + 1.0)) * beyond
     return share
 
-
-UNSURE = 0.03
-"""Of a rotor's rate from pulse to pulse [1], where a reference half a metre away tells the wind."""
-
-MOST_SKIPPED = 50
-"""Of more edges in a row that a dead time takes nobody needs the exact share."""
 
 LONG_AGO = -(2**62)
 """Before any edge [ns]."""

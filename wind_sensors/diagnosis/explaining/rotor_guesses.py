@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.comparing.observing import BANDS
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import LONG, SHORT
 from wind_sensors.diagnosis.comparing.raw_statistics.slots import SlotIntervals, slot_intervals
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
@@ -159,18 +160,18 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     local = np.interp(time[1:], expected_time[1:], np.convolve(usual, np.ones(9) / 9.0, "same"))
     relative = interval / np.maximum(local, 1e-9)
     out = []
-    long = float(np.mean(relative > 1.6))
-    short = float(np.mean(relative < 0.4))
-    usual_long = float(np.mean(usual[1:] > 1.6 * usual[:-1]))
+    long = float(np.mean(relative > LONG))
+    short = float(np.mean(relative < SHORT))
+    usual_long = float(np.mean(usual[1:] > LONG * usual[:-1]))
     dead = _dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual))
-    dead = [_without_chance(term, relative > 1.6, local, usual_long) for term in dead]
+    dead = [_without_chance(term, relative > LONG, local, usual_long) for term in dead]
     if long > 0.004 + 2.0 * usual_long and not any(term.held for term in dead):
         per_turn = 2.0 * np.pi * rotor.calibration_distance / rotor.pulses_per_revolution
         speed = per_turn / np.maximum(local, 1e-9)
-        out.append(_losses_by_chance(rotor, relative > 1.6, speed))
+        out.append(_losses_by_chance(rotor, relative > LONG, speed))
     out.extend(dead)
     if short > 0.004:
-        delay = float(np.mean(interval[relative < 0.4]))
+        delay = float(np.mean(interval[relative < SHORT]))
         bounce = suggested(
             "extra_pulses", rotor.name,
             bounce_probability=min(short / (1.0 - short), 0.9),

@@ -17,7 +17,9 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 INTERVALS = 6
-"""Number of statistics of the pulse intervals."""
+SLOTS, BEATS = 2, 4
+"""Number of statistics of the pulse intervals, and where those of the slots begin, and those of
+what beats with the wind."""
 
 LONG = 1.6
 SHORT = 0.4
