@@ -94,7 +94,7 @@ class Comparison(View):
             statistics they stay.
         deaf: Rotors whose counter is deaf for a while after each pulse. Which pulse it takes of
             those that come sooner hangs on hundredths of a millisecond, and makes its rate jump:
-            its quick eddies and its intervals, but for the places of slots, tell nothing.
+            its quick eddies tell nothing.
         moving: The mount that moves, in a wind without eddies; None on a mast.
     """
 

@@ -13,12 +13,8 @@ from wind_sensors.diagnosis.comparing import activity, spectra
 from wind_sensors.diagnosis.comparing.comparison import LOW_END, Comparison, Trust
 from wind_sensors.diagnosis.comparing.observation import Channel
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
-from wind_sensors.diagnosis.comparing.raw_statistics.pulses import (
-    BEATS,
-    INTERVALS,
-    SLOTS,
-    chance_of_intervals,
-)
+from wind_sensors.diagnosis.comparing.raw_statistics.changes import CHANGES
+from wind_sensors.diagnosis.comparing.raw_statistics.pulses import INTERVALS, chance_of_intervals
 from wind_sensors.diagnosis.comparing.raw_statistics.vanes import (
     ERRATIC,
     STILLNESS,
@@ -94,10 +90,7 @@ def _trust(
     sampling = activity.sampling_variance(channel, mean_speed, comparison.grid)
     activities = known.activity_deviation(sampling)
     if channel.instrument in comparison.deaf:
-        slots = slice(BANDS + SLOTS, BANDS + BEATS)
-        of_slots = statistics[slots].copy()
-        statistics[:] = np.inf
-        statistics[slots] = of_slots
+        statistics[:BANDS] = statistics[-CHANGES:] = np.inf
         activities = np.full_like(activities, np.inf)
     return Trust(
         slope=slope,

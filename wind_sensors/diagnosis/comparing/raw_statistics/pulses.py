@@ -17,9 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 INTERVALS = 6
-SLOTS, BEATS = 2, 4
-"""Number of statistics of the pulse intervals, and where those of the slots begin, and those of
-what beats with the wind."""
+"""Number of statistics of the pulse intervals."""
 
 LONG = 1.6
 SHORT = 0.4
