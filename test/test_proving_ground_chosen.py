@@ -55,6 +55,11 @@ def test_each_cause_comes_once_on_each_station_where_it_can_show() -> None:
     assert len(seeds) == len(set(seeds))
 
 
+def test_causes_that_cannot_show_anywhere_are_refused() -> None:
+    with pytest.raises(UserError, match="none of the causes can show"):
+        chosen_plan(["lever_arm:3"], np.random.default_rng(1), 10.0, 2, "A")
+
+
 def test_a_chosen_set_is_written_and_opened_as_any_other(tmp_path: Path) -> None:
     folder = tmp_path / "set"
     sealed = seal(

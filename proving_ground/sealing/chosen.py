@@ -60,7 +60,8 @@ def chosen_plan(
     """Each of `causes` on each station of `kinds` where it can show (a kind said twice is two
     stations), with names that tell which is which.
 
-    The stations are among those that no scoring set draws.
+    The stations are among those that no scoring set draws. Raises UserError if a cause cannot be
+    read, or if none can show on any of the stations.
     """
     wanted = [(text, parse_causes(text)) for text in causes]
     numbers = rng.choice(FIRST_SCORING_STATION, len(kinds), replace=False)
@@ -79,6 +80,12 @@ def chosen_plan(
             spec = with_effect(station, planted, 0.0, next(seeds), minutes)
             cases.append(Case(_stratum(planted), index, spec))
             names.append(f"{station.kind}{index + 1}-{text.replace(':', '_')}")
+    if not cases:
+        raise UserError(
+            "none of the causes can show on these stations",
+            f"--kinds {kinds}",
+            "A mast does not move, and what happens within a turn shows from three slots on.",
+        )
     return Plan(stations, well, tuple(cases)), names
 
 
