@@ -209,8 +209,8 @@ def forcing_of(
 ) -> tuple[float, float]:
     """Effective forcing A and slope wind B [m/s] of rotor i in an ENU wind."""
     local = at_instrument(s, i, apparent(wind, c))
-    axial, transverse, lateral = rotor_axes(s, i, local, phi, air_turn)
-    a, b, _ = rotor_forcing(rotor_of(s, i), axial, transverse, lateral)
+    axial, transverse, _ = rotor_axes(s, i, local, phi, air_turn)
+    a, b, _ = rotor_forcing(rotor_of(s, i), axial, transverse)
     return a, b
 
 

@@ -105,7 +105,7 @@ def torque_slope_ratio(angle: float) -> float:
 
 @compiled
 def rotor_forcing(
-    p: RotorParameters, axial: float, transverse: float, lateral_angle: float
+    p: RotorParameters, axial: float, transverse: float
 ) -> tuple[float, float, float]:
     """Effective forcing A, slope wind B [m/s] and lift E [m^2/s^2] of a wind in rotor axes.
 
@@ -115,8 +115,6 @@ def rotor_forcing(
             drives it forward [m/s].
         transverse: For a cup the speed in the plane of rotation h; for a propeller the speed
             across its axis [m/s].
-        lateral_angle: Direction of the transverse wind in the plane of rotation [rad]; only the
-            once-per-revolution torque uses it.
 
     Returns:
         A, B [m/s] and E [m^2/s^2]. B is the amount of A where the torque's slope follows it: air
@@ -300,7 +298,8 @@ def advance_rotor(
         p: Constants of the rotor.
         y: l s at the start [m/s].
         psi: Rotor angle at the start [rad].
-        axial, transverse, lateral: Wind in rotor axes (see `rotor_forcing`) at start and end.
+        axial, transverse: Wind in rotor axes (see `rotor_forcing`) at start and end.
+        lateral: Direction of the transverse wind in the plane of rotation [rad] then.
         density_ratio: Air density relative to the calibration's.
         temperature: Air temperature [deg C].
         dt: Interval [s].
@@ -308,8 +307,8 @@ def advance_rotor(
     Returns:
         y [m/s] and psi [rad] at the end.
     """
-    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0], lateral[0])
-    a_1, b_1, e_1 = rotor_forcing(p, axial[1], transverse[1], lateral[1])
+    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0])
+    a_1, b_1, e_1 = rotor_forcing(p, axial[1], transverse[1])
     return advance_forced(
         p, y, psi, (a_0, b_0, e_0, lateral[0]), (a_1, b_1, e_1, lateral[1]),
         density_ratio, temperature, dt,

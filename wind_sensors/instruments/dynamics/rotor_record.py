@@ -35,8 +35,9 @@ def integrate_rotor(
 
     Args:
         p: Constants of the rotor.
-        axial, transverse, lateral: Wind in rotor axes (see `rotor_forcing`), shape (n,) each; the
-            forcing they make is linear between the samples.
+        axial, transverse: Wind in rotor axes (see `rotor_forcing`), shape (n,) each; the forcing
+            they make is linear between the samples.
+        lateral: Direction of the transverse wind in the plane of rotation [rad], shape (n,).
         density_ratio: Air density relative to the calibration's, shape (n,).
         temperature: Air temperature [deg C], shape (n,).
         dt: Sampling interval [s].
@@ -50,7 +51,7 @@ def integrate_rotor(
     n = axial.shape[0]
     y_out = np.empty((n - 1) * nodes + 1)
     psi_out = np.empty((n - 1) * nodes + 1)
-    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0], lateral[0])
+    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0])
     lateral_0 = lateral[0]
     y = y_start
     if math.isnan(y):
@@ -60,7 +61,7 @@ def integrate_rotor(
     psi_out[0] = psi
     position = 0
     for i in range(1, n):
-        a_1, b_1, e_1 = rotor_forcing(p, axial[i], transverse[i], lateral[i])
+        a_1, b_1, e_1 = rotor_forcing(p, axial[i], transverse[i])
         turn = lateral[i] - lateral_0
         turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
         for k in range(nodes):
