@@ -42,6 +42,9 @@ def test_a_consistent_row_fits_without_residual() -> None:
     # K94's text says that the table agrees; the data give -0.19 +- 0.09.
     assert fit.slope_residual.value == pytest.approx(-0.19, abs=0.005)
     assert fit.slope_residual.uncertainty == pytest.approx(0.09, abs=0.005)
+    # K94 (18) holds for this cup to the last printed digit.
+    assert fit.sum_residual.value == pytest.approx(0.0, abs=1e-12)
+    assert fit.sum_residual.uncertainty == pytest.approx(0.123, abs=0.0005)
     assert fit.mu2.value == pytest.approx(1.34)
     best = fit.a4.value
     candidates = best + np.linspace(-0.1, 0.1, 41)

@@ -91,6 +91,20 @@ def test_second_order_expansion_describes_the_torque() -> None:
     assert remainders[1] > 0.0
 
 
+@pytest.mark.parametrize("a4", [0.0, 0.3, 0.77, 1.0])
+def test_overspeeding_is_what_the_rotor_does_not_follow(a4: float) -> None:
+    """K14 (75) against the mean of the integrated equation in a small sinusoidal gust."""
+    amplitude, k = 0.05, 0.8
+    y = periodic_by_integration(a4, amplitude, k, 0.0)
+    gust = amplitude * np.sin(np.linspace(0.0, 2.0 * math.pi, 401)[:-1])
+    variance, covariance = float(np.mean(gust**2)), float(np.mean(y * gust))
+    bias = rotor_family.longitudinal_bias(a4, variance, covariance, 1.0)
+    assert bias == pytest.approx(float(np.mean(y)) - 1.0, abs=amplitude**4)
+    assert rotor_family.longitudinal_bias(a4, 36.0 * variance, 36.0 * covariance, 6.0) == (
+        pytest.approx(bias)
+    )
+
+
 def periodic_by_integration(a4: float, amplitude: float, k: float, lift: float) -> FloatArray:
     def slope(theta: float, y: FloatArray) -> FloatArray:
         a = 1.0 + amplitude * math.sin(theta)
