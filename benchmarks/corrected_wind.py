@@ -53,7 +53,6 @@ class Closeness:
     """An estimated horizontal wind against the reference.
 
     Attributes:
-        speed_error: Of the speed of the mean vector, relative.
         vector_error: Size of the error of the mean vector, relative to it.
         turn: Of the mean vector [rad].
         rms: Of the instantaneous vector difference [m/s].
@@ -62,7 +61,6 @@ class Closeness:
         window_error: Relative error of the speed of the window's vector mean (`wind/mean`).
     """
 
-    speed_error: float
     vector_error: float
     turn: float
     rms: float
@@ -109,7 +107,6 @@ def closeness(recording: Recording, station: Station, method: Method) -> Closene
     window = processed.windows[0].vector_mean[:2]
     whole = reference.velocity[:, :2].mean(axis=0)
     return Closeness(
-        speed_error=float(np.hypot(*a)) / size - 1.0,
         vector_error=float(np.hypot(*(a - b))) / size,
         turn=math.atan2(a[1] * b[0] - a[0] * b[1], float(a @ b)),
         rms=rms,

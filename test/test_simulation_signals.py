@@ -486,7 +486,7 @@ def test_a_shaft_angle_tells_which_way_a_propeller_turns() -> None:
     response = respond(Station(instruments=(propeller,)), Drive(START, 0.05, wind))
     told = PulseCircuit("propeller", START, 0).signals(passed_slots(response, "propeller"))
     assert told.turns is not None
-    psi = np.interp(seconds(told.time), t, response.rotors["propeller"].psi_on_grid)
+    psi = np.interp(seconds(told.time), t, response.rotors["propeller"].psi)
     np.testing.assert_allclose(2.0 * np.pi * told.turns, psi, atol=0.3)
     steps = np.diff(told.turns) * 6.0
     np.testing.assert_allclose(np.abs(steps[steps != 0.0]), 1.0)

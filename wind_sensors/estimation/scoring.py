@@ -32,11 +32,8 @@ class Agreement:
         direction_error: Of the vector mean [rad].
         rms: Of the horizontal components [m/s].
         rms_fast: Of the horizontal components above `SLOWEST_COMPARED` [m/s].
-        expected_fast: What estimate's and reference's uncertainties make of that [m/s].
         reference_fast: What the reference's distance, path and noise alone make of it [m/s].
         coverage: Share of fast errors inside their 90 % interval [1].
-        slow_excess: Standard deviation of the difference below `SLOWEST_COMPARED`, each
-            component [m/s].
     """
 
     vector_speed_error: float
@@ -45,10 +42,8 @@ class Agreement:
     direction_error: float
     rms: float
     rms_fast: float
-    expected_fast: float
     reference_fast: float
     coverage: float
-    slow_excess: float
 
 
 def reference_variance(
@@ -128,10 +123,8 @@ def agreement(
         direction_error=float((turn + np.pi) % (2.0 * np.pi) - np.pi),
         rms=float(np.sqrt(np.mean(np.square(error)))),
         rms_fast=float(np.sqrt(np.mean(np.square(fast)))),
-        expected_fast=float(np.sqrt(np.mean(np.square(deviation)))),
         reference_fast=float(np.sqrt(np.mean(theirs))),
         coverage=float(np.mean(np.abs(fast) <= _INTERVAL * deviation)),
-        slow_excess=float(np.sqrt(np.mean(np.square(slow)))),
     )
 
 

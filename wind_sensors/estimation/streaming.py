@@ -299,21 +299,6 @@ class StreamingEstimator:
         self._finish()
         self._intake.forget()
 
-    def reset(self) -> None:
-        """Forget everything."""
-        self._intake = self._new_intake()
-        self._core = None
-        self._windows = WindowAccumulator(self.station, self.settings)
-        self._estimates.clear()
-        self._finished.clear()
-        self._latest = None
-        self._refused = 0
-        self._refusing = False
-        self._refused_since = 0
-        self._apparent_speed = 0.0
-        self._last_health = []
-        self._unknown.clear()
-
     def take_estimates(self) -> list[WindEstimate]:
         """Estimates that became final since the last call, in order of time."""
         block = self.take_estimate_arrays()

@@ -55,12 +55,10 @@ class LiveRun:
     Attributes:
         wall_seconds: From the first message to the last.
         counts: Messages recorded, by topic.
-        exit_codes: Of the processes, by node.
     """
 
     wall_seconds: float
     counts: dict[str, int]
-    exit_codes: dict[str, int]
 
 
 @dataclass
@@ -177,10 +175,11 @@ def run_live(
     try:
         execution.run(build, [], until=until, last=False)
     finally:
-        codes = {name: _stop(process) for name, process in processes.items()}
+        for process in processes.values():
+            _stop(process)
     if not watch.over:
         raise KeyboardInterrupt
-    return LiveRun(watch.last - (watch.first or watch.last), dict(made[0].counts), codes)
+    return LiveRun(watch.last - (watch.first or watch.last), dict(made[0].counts))
 
 
 def _estimator_parameters(
@@ -214,11 +213,11 @@ def _start(node: str, parameters: Mapping[str, object]) -> subprocess.Popen[byte
     )
 
 
-def _stop(process: subprocess.Popen[bytes]) -> int:
+def _stop(process: subprocess.Popen[bytes]) -> None:
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
     try:
-        return process.wait(timeout=10.0)
+        process.wait(timeout=10.0)
     except subprocess.TimeoutExpired:
         process.kill()
-        return process.wait()
+        process.wait()

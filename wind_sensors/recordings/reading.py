@@ -31,7 +31,7 @@ from wind_sensors.station.inputs import (
     scaled,
     turns_from_raw,
 )
-from wind_sensors.station.model import Angle, Cup, Input, Propeller, Station
+from wind_sensors.station.model import Cup, Input, Propeller, Station
 from wind_sensors.station.signals import (
     Angles,
     FloatArray,
@@ -202,7 +202,7 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
                 pulses[instrument.name] = rotor_pulses
         else:
             for signal, source in angle_inputs(instrument).items():
-                readings = reader.angles(instrument, signal, source)
+                readings = reader.angles(signal, source)
                 if readings is not None:
                     angles[signal] = readings
     reference = reader.winds(station.reference.topic) if station.reference else None
@@ -277,7 +277,7 @@ class _SignalReader:
             )
         return Pulses(time, counted.turns)
 
-    def angles(self, vane: Angle, signal: str, source: Input) -> Angles | None:
+    def angles(self, signal: str, source: Input) -> Angles | None:
         data = self._topic(source, f"the angle of '{signal}'")
         if data is None:
             return None

@@ -15,7 +15,6 @@ GRID = "#e3e8ec"
 REFERENCE = "#22303c"
 RAW = "#d9822b"
 CORRECTED = "#1f6fb2"
-TRUTH = "#4f9d69"
 SERIES = ("#1f6fb2", "#d9822b", "#4f9d69", "#b0487c", "#7d6bb0", "#8a6d3b")
 """Told apart by colour-blind readers too, in this order."""
 

@@ -61,16 +61,6 @@ class RotorResponse:
     psi: FloatArray
     rate: FloatArray
 
-    @property
-    def y_on_grid(self) -> FloatArray:
-        """l s [m/s] at the drive's instants, shape (n,)."""
-        return self.y[:: self.nodes]
-
-    @property
-    def psi_on_grid(self) -> FloatArray:
-        """Rotor angle [rad] at the drive's instants, shape (n,)."""
-        return self.psi[:: self.nodes]
-
 
 @dataclass(frozen=True)
 class AngleResponse:

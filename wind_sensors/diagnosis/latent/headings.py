@@ -176,13 +176,10 @@ def affine(felt: Felt, station: Station) -> tuple[ComplexArray, ComplexArray, Co
     return calm, east - calm, north - calm
 
 
-def _explained(
-    felt: Felt, station: Station, rows: BoolArray
-) -> tuple[ComplexArray, dict[int, FloatArray]]:
-    """Simulated apparent wind in the best slowly changing wind, and that wind block by block."""
+def _explained(felt: Felt, station: Station, rows: BoolArray) -> ComplexArray:
+    """Simulated apparent wind in the best slowly changing wind, block by block."""
     calm, east, north = affine(felt, station)
     out = np.full(len(felt), np.nan + 0j)
-    winds = {}
     for b in np.unique(felt.block[rows]):
         inside = np.flatnonzero(rows & (felt.block == b))
         at = felt.elapsed[inside]
@@ -194,19 +191,12 @@ def _explained(
         target = np.concatenate([wanted.real, wanted.imag])
         weights = np.linalg.lstsq(stacked, target, rcond=None)[0]
         out[inside] = calm[inside] + design @ weights
-        winds[int(b)] = weights
-    return out, winds
+    return out
 
 
 def residual_of(felt: Felt, station: Station, rows: BoolArray) -> ComplexArray:
     """Felt minus simulated apparent wind [m/s], shape (number of rows,)."""
-    simulated, _ = _explained(felt, station, rows)
-    return felt.wind[rows] - simulated[rows]
-
-
-def block_winds(felt: Felt, station: Station) -> dict[int, FloatArray]:
-    """Wind east and north and its trends per block [m/s], by number of the block."""
-    return _explained(felt, station, np.ones(len(felt), dtype=bool))[1]
+    return felt.wind[rows] - _explained(felt, station, rows)[rows]
 
 
 def bench_of(felt: Felt, station: Station) -> Bench:
