@@ -87,7 +87,8 @@ def test_an_error_of_a_wake_does_not_average_out() -> None:
 def test_direction_variance_is_corrected_towards_the_truth() -> None:
     vane = {"distance_constant": 1.5, "damping_ratio": 1.2, "noise_deg": 0.0}
     recording = blown(mast(vane=vane), speed=6.0, duration=200.0, seed=8)
-    window = process(recording, EstimatorSettings(window=200.0)).windows[0]
+    processed = process(recording, EstimatorSettings(window=200.0))
+    window = processed.windows[0]
     truth = truth_at(recording, np.arange(window.start, window.stop, 50_000_000))
     unit = truth[:, :2] / np.hypot(truth[:, 0], truth[:, 1])[:, np.newaxis]
     true = 1.0 - float(np.sum(np.square(unit.mean(axis=0))))
@@ -95,6 +96,10 @@ def test_direction_variance_is_corrected_towards_the_truth() -> None:
     assert abs(window.corrected_direction_variance - true) < 0.5 * (
         true - window.direction_variance
     )
+    told = next(i for i in processed.health if i.name == "window").values["direction_variance"]
+    value, _, uncertainty = told.removesuffix(" rad^2").split()
+    assert float(value) == pytest.approx(window.corrected_direction_variance, rel=0.01)
+    assert float(uncertainty) == pytest.approx(window.direction_variance_uncertainty, rel=0.1)
 
 
 RUBBING_CUP = mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0]

@@ -202,17 +202,23 @@ def _lift(window: WindowStatistics) -> str:
     return f"{window.vector_mean[2]:+.3f} ± {deviation:.3f}"
 
 
+def _spread(window: WindowStatistics) -> str:
+    """Standard deviation of the wind's direction with its uncertainty [deg]."""
+    variance, by = window.corrected_direction_variance, window.direction_variance_uncertainty
+    least, spread, most = (math.sqrt(max(v, 0.0)) for v in (variance - by, variance, variance + by))
+    return f"{math.degrees(spread):.1f} ± {math.degrees(0.5 * (most - least)):.1f}"
+
+
 def _cells(window: WindowStatistics, start: int, components: int) -> list[str]:
     """Mean, direction, turbulence of one window as text with uncertainties."""
     east, north = float(window.vector_mean[0]), float(window.vector_mean[1])
     along = math.sqrt(max(float(window.vector_mean_covariance[0, 0]), 0.0))
     comes_from = (270.0 - math.degrees(window.direction)) % 360.0
-    spread = math.degrees(math.sqrt(max(window.corrected_direction_variance, 0.0)))
     return [
         _span(window, start),
         f"{window.scalar_mean:.3f} ± {window.scalar_mean_uncertainty:.3f}",
         f"{math.hypot(east, north):.3f} ± {along:.3f}",
         f"{comes_from:.1f} ± {math.degrees(window.direction_uncertainty):.1f}",
         ", ".join(f"{deviation:.2f}" for deviation in window.turbulence[:components]),
-        f"{spread:.1f}",
+        _spread(window),
     ]

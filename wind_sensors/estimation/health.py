@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from wind_sensors.estimation.intake import (
     PLATFORM,
     PRESSURE,
@@ -13,6 +15,7 @@ from wind_sensors.estimation.intake import (
 )
 from wind_sensors.estimation.outputs import HealthItem, HealthLevel, WindowStatistics
 from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.station.model import Station
 
 _NEEDED = (PULSES, READINGS, PLATFORM)
@@ -131,6 +134,22 @@ def motion_health(refused: int, refusing: bool) -> HealthItem:
             values,
         )
     return HealthItem("motion", HealthLevel.OK, "The platform's motion is known.", values)
+
+
+def window_health(window: WindowStatistics) -> HealthItem:
+    """What the numbers of the latest window's topics are worth, one key for each topic."""
+    comes_from = float(direction_from_deg(window.vector_mean))
+    turn = math.degrees(window.direction_uncertainty)
+    values = {
+        "speed": f"{window.scalar_mean:.3f} +- {window.scalar_mean_uncertainty:.3f} m/s",
+        "direction_from": f"{comes_from:.2f} +- {turn:.2f} deg",
+        "direction_variance": (
+            f"{window.corrected_direction_variance:.3g} +- "
+            f"{window.direction_variance_uncertainty:.2g} rad^2"
+        ),
+        "data": f"{100.0 * window.complete:.0f} % of the window",
+    }
+    return HealthItem("window", HealthLevel.OK, "Means with their standard uncertainty.", values)
 
 
 def bias_health(window: WindowStatistics) -> HealthItem:

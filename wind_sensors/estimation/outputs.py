@@ -106,7 +106,7 @@ class HealthItem:
     """State of one input or of the estimate, for people and for `/diagnostics`.
 
     Attributes:
-        name: Input or aspect (`cup`, `vane`, `platform`, `clock`, `estimate`, `bias`).
+        name: Input or aspect (`cup`, `vane`, `platform`, `clock`, `estimate`, `window`, `bias`).
         level: How bad.
         message: One sentence.
         values: Numbers behind it, as text with units.

@@ -21,6 +21,7 @@ from wind_sensors.estimation.health import (
     clock_health,
     input_health,
     motion_health,
+    window_health,
 )
 from wind_sensors.estimation.intake import (
     PLATFORM,
@@ -337,7 +338,7 @@ class StreamingEstimator:
             self.station, self._intake.records, self.settings, self._apparent_speed
         )
         if self._latest is not None:
-            items.append(bias_health(self._latest))
+            items += [window_health(self._latest), bias_health(self._latest)]
         return items
 
 

@@ -40,7 +40,8 @@ TOPICS: dict[str, str] = {
     "wind/bias": "TwistWithCovarianceStamped: velocity removed from the raw mean",
     "wind/bias/<term>": "Float64: one relative term of it (u, v, w, vane_lag, ...)",
     "wind/nmea": "String: NMEA 0183 MWV and MWD sentences (with parameter nmea)",
-    "/diagnostics": "DiagnosticArray: health of every input and of the estimate",
+    "/diagnostics": "DiagnosticArray: health of every input and of the estimate; in `window` the "
+    "uncertainties of speed, direction_from and direction_variance",
 }
 """Output topics of an estimator node, relative to its namespace."""
 
