@@ -6,10 +6,10 @@ import argparse
 import math
 from itertools import combinations
 
+from pulse_counts import compare_pair, count_statistics
 from rich.console import Console
 from rich.table import Table
 
-from wind_sensors.diagnosis.counts import compare_pair, count_statistics
 from wind_sensors.recordings import read_recording
 from wind_sensors.station.model import Rotor
 

@@ -9,6 +9,5 @@
 - `proving`: whether data that were not fitted bear that out, and what is said.
 
 Other references have rooms of their own, with the same verdicts: `means` (ten-minute records),
-`counts` (pulses without a reference), `latent` (the earth wind behind a moving platform) and
-`watch` (live).
+`latent` (the earth wind behind a moving platform) and `watch` (live).
 """

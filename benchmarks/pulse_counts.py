@@ -1,4 +1,4 @@
-"""Statistics of the pulses in equal intervals.
+"""Statistics of the pulses in equal intervals: what whole numbers show without a reference.
 
 A counter that is read every second cuts a rotor's turn wherever the second ends. While the phase
 of the cut is as good as random, the count of n.x pulses is n or n + 1, the error of one count is
@@ -99,8 +99,6 @@ def counts_of(recording: Recording, rotor: str) -> tuple[FloatArray, IntArray]:
         )
     exact = np.diff(pulses.turns) * instrument.pulses_per_revolution
     return np.diff(pulses.time) * 1e-9, np.rint(exact).astype(np.int64)
-
-
 
 
 def count_statistics(recording: Recording, rotor: str) -> CountStatistics:
