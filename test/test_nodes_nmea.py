@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from wind_sensors.nodes.nmea import apparent_wind_sentence, checksum, true_wind_sentence
+from wind_sensors.nodes.nmea import apparent_wind_sentence, true_wind_sentence
+from wind_sensors.recordings.nmea import with_checksum
 
 
 @pytest.mark.parametrize(
@@ -15,7 +16,7 @@ from wind_sensors.nodes.nmea import apparent_wind_sentence, checksum, true_wind_
     ],
 )
 def test_checksums_of_published_sentences(body: str, expected: str) -> None:
-    assert checksum(body) == expected
+    assert with_checksum(body) == f"${body}*{expected}"
 
 
 def test_wind_from_starboard_has_an_angle_clockwise_from_the_bow() -> None:

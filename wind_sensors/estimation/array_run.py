@@ -10,7 +10,7 @@ from wind_sensors.estimation.constants import array_axes, fixed_propellers_of
 from wind_sensors.estimation.forward import MOUNT_ROTATION
 from wind_sensors.estimation.history import RotorTrack
 from wind_sensors.estimation.intake import Block
-from wind_sensors.estimation.wind_run import RunSums
+from wind_sensors.estimation.wind_run import RunSums, Windows
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -43,9 +43,7 @@ class ArrayRunCounter:
         self._tracks = [RotorTrack(p.name, station, start) for p in self._propellers]
         self._angle: list[float | None] = [None] * len(self._propellers)
         self._source = CircumstanceSource(station, use_air)
-        self._start = start
-        self._length = length
-        self._sums: dict[int, RunSums] = {}
+        self._windows = Windows(start, length)
         self.rotor = self._propellers[0]
         self.vane = None
 
@@ -55,7 +53,7 @@ class ArrayRunCounter:
         step = (block.stop - block.start) // _SAMPLES
         times = block.start + step * np.arange(_SAMPLES, dtype=np.int64)
         carried = self._source.at(times, np.zeros(3))[:, :2]
-        for sums, part in self._windows(times):
+        for sums, part in self._windows.at(times):
             sums.readings += int(np.count_nonzero(part))
             sums.carried += carried[part].sum(axis=0)
         for i, track in enumerate(self._tracks):
@@ -66,7 +64,7 @@ class ArrayRunCounter:
 
     def window(self, number: int) -> RunSums:
         """Sums of a window, which is forgotten; its size of the vector stands for the turns."""
-        sums = self._sums.pop(number, RunSums())
+        sums = self._windows.taken(number)
         sums.turned = float(np.hypot(*sums.directions))
         return sums
 
@@ -80,12 +78,6 @@ class ArrayRunCounter:
         scale = propeller.calibration_distance / self.rotor.calibration_distance
         scale /= propeller.calibration_gain
         runs = scale * turned[:, np.newaxis] * (to_earth @ self._columns[:, i])[:, :2]
-        for sums, part in self._windows(times):
+        for sums, part in self._windows.at(times):
             sums.edges += int(np.count_nonzero(part))
             sums.directions += runs[part].sum(axis=0)
-
-    def _windows(self, times: TimeArray) -> list[tuple[RunSums, npt.NDArray[np.bool_]]]:
-        number = (times - self._start) // self._length
-        return [
-            (self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)
-        ]

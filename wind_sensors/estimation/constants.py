@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from wind_sensors.estimation.forward import CUP, FIXED_AXIS, ON_VANE, Instruments
 from wind_sensors.instruments.dynamics.vane import VaneParameters
-from wind_sensors.motion import rotations
+from wind_sensors.motion.relative_wind import axis_rotation
 from wind_sensors.station.model import Bivane, Cup, Instrument, Propeller, Rotor, Station, Vane
 from wind_sensors.station.parameters import rotor_parameters, vane_parameters
 
@@ -91,11 +91,6 @@ def _mounting(rotor: Rotor, vanes: tuple[Vane, ...]) -> list[float]:
     return [float(v) for v in (*row, rotor.reference_density)]
 
 
-def _lean(tilt_deg: tuple[float, float]) -> FloatArray:
-    towards_x, towards_y = np.radians(tilt_deg)
-    return rotations.matrix(rotations.from_rotation_vector((-towards_y, towards_x, 0.0)))
-
-
 def instruments_of(station: Station) -> Instruments:
     """Constant arrays of all rotors and nose axes of a station (without changes)."""
     rotors, vanes, axes = rotors_of(station), vanes_of(station), axes_of(station)
@@ -117,7 +112,7 @@ def instruments_of(station: Station) -> Instruments:
         if isinstance(instrument, Propeller) and instrument.mounted_on:
             carrier = next(v for v in vanes if v.name == instrument.mounted_on)
             tilt = (tilt[0] + carrier.tilt_deg[0], tilt[1] + carrier.tilt_deg[1])
-        lean[k] = _lean(tilt)
+        lean[k] = axis_rotation(tilt)
         plain[k] = int(
             not instrument.wake_shadows and not np.any(distortion[k]) and tilt == (0.0, 0.0)
         )

@@ -52,6 +52,31 @@ class RunSums:
     carried: FloatArray = field(default_factory=lambda: np.zeros(2))
 
 
+class Windows:
+    """Sums of windows that follow one another.
+
+    Args:
+        start: Of the first window [ns].
+        length: Of a window [ns].
+    """
+
+    def __init__(self, start: int, length: int) -> None:
+        self._start = start
+        self._length = length
+        self._sums: dict[int, RunSums] = {}
+
+    def at(self, times: TimeArray) -> list[tuple[RunSums, npt.NDArray[np.bool_]]]:
+        """The sums of each window that the times [ns] fall into, and which of them do."""
+        number = (times - self._start) // self._length
+        return [
+            (self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)
+        ]
+
+    def taken(self, number: int) -> RunSums:
+        """Sums of a window, which is forgotten."""
+        return self._sums.pop(number, RunSums())
+
+
 class RunCounter:
     """Sorts messages into windows that follow one another and keeps their sums.
 
@@ -78,11 +103,9 @@ class RunCounter:
             for s in self._timeline.stations
         ]
         self._source = CircumstanceSource(self._timeline.stations[0], use_air)
-        self._start = start
-        self._length = length
         self._last_time = 0
         self._last_angle = 0.0
-        self._sums: dict[int, RunSums] = {}
+        self._windows = Windows(start, length)
         self._pending: list[Block] = []
 
     def take(self, block: Block) -> None:
@@ -94,7 +117,7 @@ class RunCounter:
     def window(self, number: int) -> RunSums:
         """Sums of a window, which is forgotten."""
         self._sum_up()
-        return self._sums.pop(number, RunSums())
+        return self._windows.taken(number)
 
     def _calibration(self, times: TimeArray) -> tuple[FloatArray, FloatArray]:
         """Gain, and the speed at which the rotor would stand still [m/s], shape (n,) each."""
@@ -126,7 +149,7 @@ class RunCounter:
             times, heading = h.nose.time[-readings:], h.nose.angle[-readings:]
             unit, carried = self._directions(times, heading)
             _, offset = self._calibration(times)
-            for sums, part in self._windows(times):
+            for sums, part in self._windows.at(times):
                 sums.readings += int(np.count_nonzero(part))
                 sums.offsets += float(offset[part].sum())
                 sums.time_directions += (offset[part, np.newaxis] * unit[part]).sum(axis=0)
@@ -144,7 +167,7 @@ class RunCounter:
         self._last_time, self._last_angle = int(times[-1]), float(angle[-1])
         turned = turned / self._calibration(times)[0]
         unit, _ = self._directions(times, np.interp(times, h.nose.time, h.nose.angle))
-        for sums, part in self._windows(times):
+        for sums, part in self._windows.at(times):
             sums.edges += int(np.count_nonzero(part))
             sums.turned += float(turned[part].sum())
             sums.directions += (unit[part] * turned[part, np.newaxis]).sum(axis=0)
@@ -153,10 +176,3 @@ class RunCounter:
             sums.intervals += int(np.count_nonzero(moving))
             sums.interval_time += float(dt[moving].sum())
             sums.interval_turned += float(turned[moving].sum())
-
-    def _windows(self, times: TimeArray) -> list[tuple[RunSums, npt.NDArray[np.bool_]]]:
-        """The sums of each window that the times fall into, and which of them do."""
-        number = (times - self._start) // self._length
-        return [
-            (self._sums.setdefault(int(k), RunSums()), number == k) for k in np.unique(number)
-        ]

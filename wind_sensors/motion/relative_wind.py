@@ -28,6 +28,17 @@ def sensor_rotation(platform: Platform) -> FloatArray:
     return rotations.matrix(rotations.from_roll_pitch_yaw(roll, pitch, yaw))
 
 
+def axis_rotation(tilt_deg: tuple[float, float]) -> FloatArray:
+    """Matrix that turns instrument axes into sensor axes when the axis leans; shape (3, 3).
+
+    Args:
+        tilt_deg: Lean of the axis towards the sensor's x and y [deg]; one rotation about the
+            horizontal axis across the lean.
+    """
+    towards_x, towards_y = np.radians(tilt_deg)
+    return rotations.matrix(rotations.from_rotation_vector((-towards_y, towards_x, 0.0)))
+
+
 def sensor_velocity(motion: Motion, lever_arm: npt.ArrayLike) -> FloatArray:
     """v + omega x r of a point of the platform, in platform axes [m/s], shape (n, 3)."""
     r = np.asarray(lever_arm, dtype=np.float64)

@@ -20,7 +20,7 @@ from wind_sensors.diagnosis.watch import Finding, Watch, WatchSettings
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.inputs import EstimatorInputs, message_class, nanoseconds
-from wind_sensors.nodes.parameters import Parameter, Value, declare, describe
+from wind_sensors.nodes.parameters import Parameter, Value, declare, describe, number
 from wind_sensors.nodes.quality import INPUT_DEPTH, input_quality, subscribe
 from wind_sensors.nodes.station_parameters import (
     STATION,
@@ -187,7 +187,7 @@ class MonitorNode(Node):
         self._winds_unusable = 0
         self._told: Finding | None = None
         quality = input_quality(
-            reliable=bool(values["reliable_inputs"]), depth=int(_number(values["input_depth"]))
+            reliable=bool(values["reliable_inputs"]), depth=int(number(values["input_depth"]))
         )
         for source in self._inputs.sources():
             subscribe(self, source.message_type, source.topic, source.receive, quality)
@@ -202,7 +202,7 @@ class MonitorNode(Node):
         self._updater = Updater(
             self,
             [self._comparison, self._mismatch, self._past, self._estimate, self._inputs.statuses],
-            period=_number(values["diagnostics_period"]),
+            period=number(values["diagnostics_period"]),
         )
 
     def destroy_node(self) -> None:
@@ -244,10 +244,10 @@ class MonitorNode(Node):
         return WatchSettings(
             drive=drive,
             driving=driving,
-            block=_number(values["block"]),
-            learning=int(_number(values["learning_blocks"])),
-            false_alarms_per_day=_number(values["false_alarms_per_day"]),
-            wait=_number(values["wait"]),
+            block=number(values["block"]),
+            learning=int(number(values["learning_blocks"])),
+            false_alarms_per_day=number(values["false_alarms_per_day"]),
+            wait=number(values["wait"]),
         )
 
     def _wind_receiver(self, source: Input) -> Any:
@@ -386,12 +386,6 @@ def _process_beside() -> ProcessPoolExecutor:
         initializer=signal.signal,
         initargs=(signal.SIGINT, signal.SIG_IGN),
     )
-
-
-def _number(value: Value) -> float:
-    if not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} is not a number")
-    return float(value)
 
 
 def build(arguments: Sequence[str]) -> list[Node]:

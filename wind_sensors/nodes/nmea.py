@@ -6,25 +6,14 @@ north. Both state where the wind comes from.
 
 from __future__ import annotations
 
-from functools import reduce
-
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.motion.frames import direction_from_deg
+from wind_sensors.recordings.nmea import with_checksum
 
 KNOT = 1852.0 / 3600.0
 """[m/s]"""
-
-
-def checksum(body: str) -> str:
-    """Exclusive or of the characters between `$` and `*`, as two hexadecimal digits."""
-    return f"{reduce(lambda total, character: total ^ ord(character), body, 0):02X}"
-
-
-def sentence(body: str) -> str:
-    """The body with start, checksum and line end."""
-    return f"${body}*{checksum(body)}\r\n"
 
 
 def apparent_wind_sentence(apparent: npt.ArrayLike, talker: str = "WI") -> str:
@@ -37,7 +26,7 @@ def apparent_wind_sentence(apparent: npt.ArrayLike, talker: str = "WI") -> str:
     forward, left = np.asarray(apparent, dtype=np.float64)[:2]
     from_bow = np.degrees(np.arctan2(left, -forward)) % 360.0
     speed = float(np.hypot(forward, left))
-    return sentence(f"{talker}MWV,{_bearing(from_bow)},R,{speed:.2f},M,A")
+    return _line(f"{talker}MWV,{_bearing(from_bow)},R,{speed:.2f},M,A")
 
 
 def true_wind_sentence(
@@ -54,9 +43,13 @@ def true_wind_sentence(
     true_deg = float(direction_from_deg(np.array([wind[0], wind[1], 0.0])))
     magnetic = "" if declination_deg is None else _bearing((true_deg - declination_deg) % 360.0)
     speed = float(np.hypot(wind[0], wind[1]))
-    return sentence(
+    return _line(
         f"{talker}MWD,{_bearing(true_deg)},T,{magnetic},M,{speed / KNOT:.2f},N,{speed:.2f},M"
     )
+
+
+def _line(body: str) -> str:
+    return f"{with_checksum(body)}\r\n"
 
 
 def _bearing(degrees: float) -> str:

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rosgraph_msgs.msg import Clock as ClockMessage
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import message_class
-from wind_sensors.nodes.outputs import stamp
 from wind_sensors.nodes.quality import SETTLING, advertise, output_quality
+from wind_sensors.nodes.simulated_time import SimulatedTime
 
 if TYPE_CHECKING:
     from wind_sensors.recordings.bag import BagContent
@@ -72,7 +71,6 @@ class PlayerNode(Node):
         self.finished = False
         self._rate = rate
         self._loop = loop
-        self._clock_period = round(_CLOCK_PERIOD * rate)
         self._waits_for = wait_for_subscribers
         self._outlets = [
             advertise(
@@ -90,11 +88,8 @@ class PlayerNode(Node):
         self._order = np.argsort(times, kind="stable")
         self._times = times[self._order]
         self._owner = owner[self._order]
-        self._clock_outlet = (
-            advertise(self, ClockMessage, "/clock", output_quality(1)) if with_clock else None
-        )
+        self._time = SimulatedTime(self, round(_CLOCK_PERIOD * rate)) if with_clock else None
         self._next = 0
-        self._next_clock = 0
         self._ready_at = 0.0
         self._started: float | None = None
         self._timer = self.create_timer(
@@ -125,8 +120,7 @@ class PlayerNode(Node):
                 self._ready_at = time.monotonic() + SETTLING
             if time.monotonic() < self._ready_at:
                 return
-            self._started = time.monotonic()
-            self._next_clock = int(self._times[0])
+            self._start()
         now = int(self._times[0]) + round(self._elapsed() * 1e9)
         due = int(np.searchsorted(self._times, now, side="right"))
         for index in range(self._next, due):
@@ -138,15 +132,18 @@ class PlayerNode(Node):
         if due == len(self._times):
             self._at_end()
 
+    def _start(self) -> None:
+        self._started = time.monotonic()
+        if self._time is not None:
+            self._time.start_at(int(self._times[0]))
+
     def _tell_time(self, now: int) -> None:
-        if self._clock_outlet is not None and now >= self._next_clock:
-            self._clock_outlet.publish(ClockMessage(clock=stamp(now)))
-            self._next_clock = now + self._clock_period
+        if self._time is not None:
+            self._time.tell(now)
 
     def _at_end(self) -> None:
         if self._loop:
             self._next = 0
-            self._started = time.monotonic()
-            self._next_clock = int(self._times[0])
+            self._start()
         else:
             self.finished = True

@@ -13,15 +13,14 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
-from rosgraph_msgs.msg import Clock as ClockMessage
 
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
-from wind_sensors.nodes.outputs import stamp
 from wind_sensors.nodes.parameters import Parameter, declare, describe, number
 from wind_sensors.nodes.quality import SETTLING, advertise, input_quality, output_quality, subscribe
 from wind_sensors.nodes.receipts import RECEIPTS_DEPTH, RECEIPTS_TOPIC, ReceiptBook
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.nodes.signal_messages import SignalEncoder
+from wind_sensors.nodes.simulated_time import SimulatedTime
 from wind_sensors.nodes.station_parameters import (
     STATION,
     base_document,
@@ -157,14 +156,12 @@ class SimulatorNode(Node):
         }
         self._counts = dict.fromkeys(encoder.topics, 0)
         self._resolved = {topic: self.resolve_topic_name(topic) for topic in encoder.topics}
-        self._clock_outlet = (
-            advertise(self, ClockMessage, "/clock", output_quality(1)) if self._with_clock else None
-        )
+        self._time: SimulatedTime | None = None
+        if self._with_clock:
+            self._time = SimulatedTime(self, max(round(_CLOCK_WALL_PERIOD * self._speed), 1))
         if values["wait_for_receipts"]:
             quality = input_quality(reliable=True, depth=RECEIPTS_DEPTH)
             subscribe(self, DiagnosticStatus, RECEIPTS_TOPIC, self._book.note_received, quality)
-        self._clock_period = max(round(_CLOCK_WALL_PERIOD * self._speed), 1)
-        self._next_clock = 0
         # A first look compiles the kernels, which must not delay the stream once it runs.
         self._events: Iterator[Event] = live_events(SignalStream(self.station, self._scenario))
         self._next_event = next(self._events)
@@ -253,14 +250,14 @@ class SimulatorNode(Node):
             self._end = self._begin + round(self._duration * 1e9)
         self._events = live_events(SignalStream(self.station, self._scenario, self._begin))
         self._next_event = next(self._events)
-        self._next_clock = self._begin
+        if self._time is not None:
+            self._time.start_at(self._begin)
         self._ticked_at = time.monotonic()
         self._running = True
 
     def _tell_time(self, now: int) -> None:
-        if self._clock_outlet is not None and now >= self._next_clock:
-            self._clock_outlet.publish(ClockMessage(clock=stamp(now)))
-            self._next_clock = now + self._clock_period
+        if self._time is not None:
+            self._time.tell(now)
 
     def _status(self) -> Iterable[Status]:
         details = {

@@ -79,17 +79,6 @@ def _scale_by_wake(
             wind[i, k] *= factor
 
 
-def axis_rotation(tilt_deg: tuple[float, float]) -> FloatArray:
-    """Matrix that turns instrument axes into sensor axes when the axis leans; shape (3, 3).
-
-    Args:
-        tilt_deg: Lean of the axis towards the sensor's x and y [deg]; one rotation about the
-            horizontal axis across the lean.
-    """
-    towards_x, towards_y = np.radians(tilt_deg)
-    return rotations.matrix(rotations.from_rotation_vector((-towards_y, towards_x, 0.0)))
-
-
 def _weighs(instrument: Instrument) -> bool:
     """Whether gravity turns an instrument."""
     return isinstance(instrument, Angle) and instrument.imbalance != 0.0
@@ -205,7 +194,7 @@ class WindAtSensors:
         if weighs:
             gravity = self._gravity(instrument, count) @ to_platform
         if tilt != (0.0, 0.0):
-            lean = axis_rotation(tilt)
+            lean = relative_wind.axis_rotation(tilt)
             in_sensor, turning, gravity = in_sensor @ lean, turning @ lean, gravity @ lean
         return Flow(in_sensor, turning, gravity)
 
