@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,54 @@ def test_ros_finds_the_package(declaration: dict[str, Any]) -> None:
     assert [(ROOT / name).exists() for name in marker] == [True]
     assert "share/wind_sensors" in files
     assert declaration["extras_require"]["test"], "without it colcon test runs nothing"
+
+
+NODES_WITHOUT = {"rosbags", "lz4", "rich", "matplotlib", "tzdata"}
+"""Requirements of the commands alone."""
+
+START_OF_A_NODE = f"""
+import sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {NODES_WITHOUT!r}:
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Missing())
+from importlib import import_module
+for name in sys.argv[1:]:
+    import_module(f"wind_sensors.nodes.{{name}}")
+from wind_sensors.recordings import load_station
+print(load_station("mast_cup_vane").instruments[0].name)
+"""
+
+
+def test_nodes_start_without_the_libraries_of_bags_and_screens() -> None:
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    modules = {p.stem for p in (ROOT / "wind_sensors" / "nodes").glob("*.py")}
+    # These two write bags, for `wind record` and `wind compose`.
+    of_nodes = sorted(modules - {"__init__", "recorder", "composition"})
+    assert {"estimator_node", "simulator", "monitor"} < set(of_nodes)
+    started = subprocess.run(
+        [sys.executable, "-c", START_OF_A_NODE, *of_nodes],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (started.stdout, started.returncode) == ("cup\n", 0), started.stderr
+
+
+def test_the_robot_recipe_names_every_requirement_once(declaration: dict[str, Any]) -> None:
+    """By rosdep or by pip: what rosdep resolves is in package.xml, the rest in the README."""
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    by_rosdep = {d.text for d in package.iter("exec_depend")}
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    recipe = text[text.index("## On a robot") : text.index("| executable |")]
+    (pip,) = re.findall(r"pip install .*", recipe)
+    by_pip = set(re.findall(r"`([\w.]+)`", recipe)) | set(pip.replace('"', "").split())
+    for requirement in declaration["install_requires"]:
+        name = re.split(r"[><=]", requirement)[0]
+        if name != "setuptools":
+            named = {name, requirement} & by_pip
+            assert bool(named) != (f"python3-{name}" in by_rosdep), requirement
 
 
 def test_every_configuration_is_installed(declaration: dict[str, Any]) -> None:
