@@ -68,13 +68,6 @@ def test_sampling_is_judged() -> None:
     )
 
 
-def test_wind_vector_from_two_angles() -> None:
-    vector = bivane.wind_vector(0.4, -0.2, 6.0)
-    assert np.linalg.norm(vector) == pytest.approx(6.0)
-    assert math.atan2(vector[1], vector[0]) == pytest.approx(0.4)
-    assert vector[2] == pytest.approx(6.0 * math.sin(-0.2))
-
-
 @pytest.mark.parametrize("half_width", [1, 3, 6])
 def test_wider_differences_are_exact_for_their_polynomials(half_width: int) -> None:
     first, second = bivane.difference_weights(half_width)

@@ -12,13 +12,15 @@ import pytest
 from wind_sensors.report.paper_figures import FIGURES
 
 TEXT = (Path(__file__).resolve().parents[1] / "docs" / "equations.md").read_text(encoding="utf-8")
-PACKAGES = {"T": "wind_sensors.turbulence", "I": "wind_sensors.instruments"}
+PACKAGES = {
+    "T": "wind_sensors.turbulence", "I": "wind_sensors.instruments", "M": "wind_sensors.motion"
+}
 
 
 def rows() -> list[str]:
     """Function cells of the tables."""
     cells = [line.split("|")[2].strip() for line in TEXT.splitlines() if line.startswith("|")]
-    return [cell for cell in cells if re.match(r"[TI]\.", cell)]
+    return [cell for cell in cells if re.match(r"[TIM]\.", cell)]
 
 
 def exists(module: ModuleType, name: str) -> bool:
@@ -29,10 +31,10 @@ def exists(module: ModuleType, name: str) -> bool:
 @pytest.mark.parametrize("cell", rows())
 def test_named_functions_exist(cell: str) -> None:
     module: ModuleType | None = None
-    for token in re.findall(r"[TI]\.\w+\.[\w*]+|\.[\w*]+|\*\w+", cell):
+    for token in re.findall(r"[TIM](?:\.\w+)+\.[\w*]+|\.[\w*]+|\*\w+", cell):
         if token[0] in PACKAGES:
-            package, module_name, function = token.split(".")
-            module = import_module(f"{PACKAGES[package]}.{module_name}")
+            place, function = token.rsplit(".", 1)
+            module = import_module(PACKAGES[place[0]] + place[1:])
         else:
             function = token.removeprefix(".")
         assert module is not None

@@ -395,7 +395,7 @@ def test_felt_gravity_is_the_plumb_line_of_a_swing() -> None:
     t = np.arange(100) * 0.05
     fall = np.zeros((100, 3))
     fall[:, 2] = -relative_wind.STANDARD_GRAVITY * t
-    level = np.tile(rotations.IDENTITY, (100, 1))
+    level = np.tile((0.0, 0.0, 0.0, 1.0), (100, 1))
     falling = Motion(level, fall, np.zeros((100, 3)), np.zeros((100, 3)))
     np.testing.assert_allclose(relative_wind.felt_gravity(falling, (0, 0, 0), 0.05), 0.0, atol=1e-9)
     lean = motion_at(Rotation.from_euler("y", 0.2).as_quat(), count=5)

@@ -90,7 +90,7 @@ def at_rest(
     rate: npt.ArrayLike = (0.0, 0.0, 0.0),
     attitude: FloatArray | None = None,
 ) -> Motion:
-    q = np.tile(rotations.IDENTITY, (count, 1)) if attitude is None else attitude
+    q = np.tile((0.0, 0.0, 0.0, 1.0), (count, 1)) if attitude is None else attitude
     return Motion(
         q, np.tile(np.asarray(velocity, float), (count, 1)),
         np.tile(np.asarray(rate, float), (count, 1)), np.zeros((count, 3)),

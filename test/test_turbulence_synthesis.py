@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -148,3 +149,6 @@ def test_impossible_wishes_are_refused() -> None:
         TurbulenceStream(TurbulenceSpec(0.0), 10.0)
     largest = largest_uw_correlation(SPEC, 10.0)
     assert 0.3 < largest < 1.0
+    TurbulenceStream(replace(SPEC, uw_correlation=-0.999 * largest), 10.0)
+    with pytest.raises(ValueError, match="correlation"):
+        TurbulenceStream(replace(SPEC, uw_correlation=-1.001 * largest), 10.0)

@@ -24,6 +24,7 @@ from wind_sensors.estimation import (
     process,
 )
 from wind_sensors.estimation.constants import measures_vertical
+from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.recordings import write_recording
 from wind_sensors.recordings.bag import TopicData
 from wind_sensors.recordings.other_topics import OtherTopics
@@ -213,7 +214,7 @@ def _cells(window: WindowStatistics, start: int, components: int) -> list[str]:
     """Mean, direction, turbulence of one window as text with uncertainties."""
     east, north = float(window.vector_mean[0]), float(window.vector_mean[1])
     along = math.sqrt(max(float(window.vector_mean_covariance[0, 0]), 0.0))
-    comes_from = (270.0 - math.degrees(window.direction)) % 360.0
+    comes_from = float(direction_from_deg(window.vector_mean))
     return [
         _span(window, start),
         f"{window.scalar_mean:.3f} ± {window.scalar_mean_uncertainty:.3f}",

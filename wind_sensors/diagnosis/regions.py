@@ -19,6 +19,7 @@ from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, Chann
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
 from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.motion.frames import compass_from_yaw, heading_of
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -91,13 +92,18 @@ def _speed_regions(comparison: Comparison) -> Iterator[tuple[str, float, float, 
     yield "speed", middle, float(edges[-1]), f"above {middle:.1f} m/s", speed > middle
 
 
+def clockwise_from(comparison: Comparison) -> FloatArray:
+    """Where the wind comes from, clockwise from north or, on a platform, the bow [deg, 0..360)."""
+    if comparison.drive.motion is None:
+        return compass_from_yaw(comparison.wind_from)
+    return np.asarray(np.mod(-np.degrees(comparison.wind_from), 360.0))
+
+
 def _sector_regions(
     comparison: Comparison,
 ) -> Iterator[tuple[str, float, float, str, BoolArray]]:
-    heading = np.degrees(comparison.wind_from)
-    on_platform = comparison.drive.motion is not None
-    clockwise = np.mod(-heading if on_platform else 90.0 - heading, 360.0)
-    of = "from the bow" if on_platform else "from north"
+    clockwise = clockwise_from(comparison)
+    of = "from the bow" if comparison.drive.motion is not None else "from north"
     for width in _SECTOR_WIDTHS_DEG:
         for low in np.arange(0.0, 360.0, width):
             inside = (clockwise >= low) & (clockwise < low + width)
@@ -111,10 +117,9 @@ def _heading_regions(
     motion = comparison.drive.motion
     if motion is None:
         return
-    x, y, z, w = motion.attitude.T
-    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    yaw = np.unwrap(heading_of(motion.attitude))
     at = np.arange(len(comparison.drive)) * comparison.drive.dt
-    heading = np.mod(90.0 - np.degrees(np.interp(comparison.grid.centres, at, yaw)), 360.0)
+    heading = compass_from_yaw(np.interp(comparison.grid.centres, at, yaw))
     for low in np.arange(0.0, 360.0, 45.0):
         inside = (heading >= low) & (heading < low + 45.0)
         yield "heading", float(low), float(low + 45.0), f"heading {low:.0f} deg", inside

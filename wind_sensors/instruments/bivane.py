@@ -231,23 +231,6 @@ def judge_sampling(
     )
 
 
-def wind_vector(
-    azimuth: npt.ArrayLike, elevation: npt.ArrayLike, speed: npt.ArrayLike
-) -> FloatArray:
-    """Wind velocity [m/s], shape (..., 3), from the bivane's two angles and the total speed.
-
-    Args:
-        azimuth: Heading of the air, counter-clockwise from x [rad].
-        elevation: Angle of the air's path above the horizontal [rad].
-        speed: Total speed [m/s].
-    """
-    alpha = np.asarray(azimuth, dtype=np.float64)
-    epsilon = np.asarray(elevation, dtype=np.float64)
-    v = np.asarray(speed, dtype=np.float64)
-    level = v * np.cos(epsilon)
-    return np.stack([level * np.cos(alpha), level * np.sin(alpha), v * np.sin(epsilon)], axis=-1)
-
-
 def _positive(speed: npt.ArrayLike) -> FloatArray:
     v = np.asarray(speed, dtype=np.float64)
     return np.where(v > 0.0, v, np.nan)

@@ -84,17 +84,6 @@ def tripod_axes(wind_heading: float, wind_elevation: float = 0.0, roll: float = 
     return np.asarray(math.cos(inclination) * along + math.sin(inclination) * across)
 
 
-def clearance(axes: npt.ArrayLike, wind: npt.ArrayLike) -> FloatArray:
-    """Smallest distance of the wind's direction from any propeller's plane [rad], shape (...).
-
-    Args:
-        axes: Unit vectors, shape (m, 3).
-        wind: Wind velocity [m/s], shape (..., 3).
-    """
-    angles = wind_angles(axes, wind)
-    return np.asarray(np.min(np.abs(angles - 0.5 * math.pi), axis=-1))
-
-
 def wind_angles(axes: npt.ArrayLike, wind: npt.ArrayLike) -> FloatArray:
     """Angle of the wind to each axis [rad, 0..pi], shape (..., m); pi/2 in a calm."""
     unit = np.asarray(axes, dtype=np.float64)

@@ -157,31 +157,3 @@ def slot_fractions(edges: npt.ArrayLike, pulses_per_revolution: int) -> FloatArr
     share = (t[first + 1] - t[first]) / turn
     fractions = np.array([np.median(share[first % n == slot]) for slot in range(n)])
     return np.asarray(fractions / np.sum(fractions), dtype=np.float64)
-
-
-def edge_angles(count: int, fractions: npt.ArrayLike, first_slot: int = 0) -> FloatArray:
-    """Rotor angle at each edge [rad], shape (count,), from the slots' shares of a turn.
-
-    Args:
-        count: Number of edges.
-        fractions: Share of each slot [1], shape (n,).
-        first_slot: Slot that begins at the first edge.
-    """
-    share = np.asarray(fractions, dtype=np.float64)
-    boundaries = np.concatenate([[0.0], np.cumsum(share)])
-    index = first_slot + np.arange(count)
-    turns, slots = np.divmod(index, share.size)
-    angle = turns * boundaries[-1] + boundaries[slots]
-    return np.asarray(2.0 * math.pi * (angle - angle[0] if count else angle))
-
-
-def largest_rate(time_since_edge: npt.ArrayLike, slot_angle: float) -> FloatArray:
-    """Largest mean rate [rad/s] that a silence allows: no edge for t means s < slot/t.
-
-    Args:
-        time_since_edge: t [s], positive.
-        slot_angle: Angle of the slot in progress [rad].
-    """
-    t = np.asarray(time_since_edge, dtype=np.float64)
-    with np.errstate(divide="ignore"):
-        return slot_angle / t

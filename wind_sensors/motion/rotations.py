@@ -11,8 +11,6 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-IDENTITY: FloatArray = np.array([0.0, 0.0, 0.0, 1.0])
-
 
 def normalise(quaternion: npt.ArrayLike) -> FloatArray:
     """Unit quaternions of the same direction; shape (..., 4)."""

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from scipy.signal import welch
 from scipy.stats import norm
 
+from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.report.cuts import is_narrow
 from wind_sensors.report.demo_results import DemoResults
 from wind_sensors.report.style import CORRECTED, INK, MUTED, RAW
@@ -47,7 +48,7 @@ def gust(results: DemoResults, figure: Figure) -> None:
         (results.naive, RAW, 1.6),
         (results.corrected, CORRECTED, 1.6),
     ):
-        turn.plot(seconds, _direction_from(wind[shown]), color=colour, lw=width)
+        turn.plot(seconds, direction_from_deg(wind[shown]), color=colour, lw=width)
     turn.set_ylabel("from [°]")
     turn.set_xlabel("time [s]")
 
@@ -117,10 +118,6 @@ def _sharpest_gust(results: DemoResults) -> slice:
 
 def _speed(wind: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(wind[:, 0], wind[:, 1]))
-
-
-def _direction_from(wind: FloatArray) -> FloatArray:
-    return np.asarray(np.degrees(np.unwrap(np.arctan2(-wind[:, 0], -wind[:, 1]))) % 360.0)
 
 
 def _is_narrow(figure: Figure) -> bool:

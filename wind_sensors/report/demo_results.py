@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import norm
 
 from wind_sensors.estimation.outputs import ProcessedRecording, WindowStatistics
+from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.report.live_agreement import Agreement
 from wind_sensors.station.signals import FloatArray, TimeArray, Winds
 
@@ -122,8 +123,8 @@ def _compared(window: WindowStatistics, truth: Winds, begin: int) -> WindowCompa
         predicted_bias=float(sum(term.value for term in chosen)),
         predicted_uncertainty=float(np.sqrt(sum(term.uncertainty**2 for term in chosen))),
         found_bias=window.raw_scalar_mean / vector_speed - 1.0,
-        true_direction_deg=_direction_from(mean),
-        corrected_direction_deg=_direction_from(corrected),
+        true_direction_deg=float(direction_from_deg(mean)),
+        corrected_direction_deg=float(direction_from_deg(corrected)),
     )
 
 
@@ -144,7 +145,3 @@ def _at(winds: Winds, time: TimeArray) -> FloatArray:
 
 def _rms(error: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
-
-
-def _direction_from(velocity: FloatArray) -> float:
-    return float(np.degrees(np.arctan2(-velocity[0], -velocity[1])) % 360.0)

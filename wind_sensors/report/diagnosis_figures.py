@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.comparing.observation import NORMALISED_BANDS, Chann
 from wind_sensors.diagnosis.comparing.observing import BANDS, Simulated
 from wind_sensors.diagnosis.comparing.raw_statistics import STATISTICS
 from wind_sensors.diagnosis.healthy.baseline import ChannelBaseline
-from wind_sensors.diagnosis.regions import eddies
+from wind_sensors.diagnosis.regions import clockwise_from, eddies
 from wind_sensors.report import style
 from wind_sensors.report.cuts import WIDE, is_narrow, label_for, title_for
 
@@ -96,8 +96,7 @@ def residual_figure(
     smoothed = max(int(_SMOOTHING / comparison.grid.dt), 1)
     at = comparison.grid.centres
     on_platform = comparison.drive.motion is not None
-    heading = np.degrees(comparison.wind_from)
-    clockwise = np.mod(-heading if on_platform else 90.0 - heading, 360.0)
+    clockwise = clockwise_from(comparison)
     with style.house():
         stacked = is_narrow(width)
         made = Figure(figsize=(width, 10.4 if stacked else 6.6), layout="constrained")

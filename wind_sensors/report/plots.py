@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
-from wind_sensors.motion.frames import direction_from_deg, heading_of
+from wind_sensors.motion.frames import compass_from_yaw, direction_from_deg, heading_of
 from wind_sensors.report import style
 from wind_sensors.station.model import Cup, Propeller
 from wind_sensors.station.signals import FloatArray, Pulses, Recording, TimeArray
@@ -103,7 +103,7 @@ def direction_figure(recording: Recording, estimates: Estimates | None) -> Figur
         if name.endswith("/elevation") or not len(angles.time):
             continue
         heading = angles.angle + _sensor_heading(recording, angles.time)
-        degrees = np.mod(90.0 - np.degrees(heading), 360.0)
+        degrees = compass_from_yaw(heading)
         colour = style.SERIES[(index + 1) % len(style.SERIES)]
         lines.append((f"{name}, as read", angles.time, degrees, colour))
     if estimates is not None:

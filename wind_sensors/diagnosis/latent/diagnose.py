@@ -18,7 +18,6 @@ from wind_sensors.diagnosis.latent.headings import (
     Felt,
     bench_of,
     felt_by,
-    heading_of,
     heading_spread,
     residual_of,
 )
@@ -30,6 +29,7 @@ from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplain
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.errors import UserError
+from wind_sensors.motion.frames import compass_from_yaw, heading_of
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
 
@@ -179,7 +179,7 @@ def _placebo(felt: Felt, bench: Bench, term: Term) -> FloatArray | None:
     # The velocity of another time as it would have been in the earth's axes.
     turn = np.ones(len(felt), dtype=np.complex128)
     if platform.velocity_axes == "platform":
-        turn = np.exp(1j * heading_of(felt.motion))
+        turn = np.exp(1j * heading_of(felt.motion.attitude))
     plane = (felt.motion.velocity[:, 0] + 1j * felt.motion.velocity[:, 1]) * turn
     plane = np.roll(plane, len(felt) // 3) / turn
     velocity = np.column_stack((plane.real, plane.imag, felt.motion.velocity[:, 2]))
@@ -321,7 +321,7 @@ def _panels(felt: Felt, before: Station, after: Station) -> tuple[Panel, ...]:
     count = np.bincount(felt.block)
     when = np.asarray(np.bincount(felt.block, felt.elapsed) / count / 60.0, dtype=np.float64)
     rms = [np.asarray(np.sqrt(np.bincount(felt.block, r**2) / count)) for r in (one, two)]
-    compass = np.mod(90.0 - np.degrees(heading_of(felt.motion)), 360.0)
+    compass = compass_from_yaw(heading_of(felt.motion.attitude))
     sector = np.floor(compass / 30.0).astype(np.intp)
     filled = np.bincount(sector, minlength=12) > 20
     at = np.asarray((np.arange(12) * 30.0 + 15.0)[filled], dtype=np.float64)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.means.averages import BoolArray
 from wind_sensors.diagnosis.means.bench import Bench
 from wind_sensors.errors import UserError
+from wind_sensors.motion.frames import heading_of
 from wind_sensors.motion.platform_track import Motion, PlatformTrack
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
@@ -144,15 +145,9 @@ def felt_by(recording: Recording) -> Felt:
     )  # fmt: skip
 
 
-def heading_of(motion: Motion) -> FloatArray:
-    """Heading of the platform, counter-clockwise from east [rad]."""
-    x, y, z, w = motion.attitude.T
-    return np.asarray(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-
-
 def heading_spread(felt: Felt) -> FloatArray:
     """Circular standard deviation of the heading in each block [rad]."""
-    unit = np.exp(1j * heading_of(felt.motion))
+    unit = np.exp(1j * heading_of(felt.motion.attitude))
     count = np.bincount(felt.block)
     mean = np.bincount(felt.block, unit.real) + 1j * np.bincount(felt.block, unit.imag)
     return np.asarray(np.sqrt(-2.0 * np.log(np.clip(np.abs(mean) / count, 1e-12, 1.0))))

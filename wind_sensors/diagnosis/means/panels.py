@@ -10,6 +10,7 @@ import numpy.typing as npt
 from wind_sensors.diagnosis.means.pair import Pair
 from wind_sensors.diagnosis.means.vanes import VaneBench
 from wind_sensors.diagnosis.outcome import Panel
+from wind_sensors.motion.frames import compass_from_yaw
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -51,7 +52,7 @@ def of_pair(pair: Pair, station: Station, explained: Station) -> list[Panel]:
     speed = pair.wind(explained)
     before = 100.0 * pair.residual(station) / speed
     after = 100.0 * pair.residual(explained) / speed
-    from_north = np.mod(90.0 - np.degrees(pair.heading), 360.0)
+    from_north = compass_from_yaw(pair.heading)
     day = pair.averages.elapsed / _DAY
     unit = "% of the wind"
     top = float(np.quantile(speed, 0.995))
