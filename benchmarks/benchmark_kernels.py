@@ -184,12 +184,12 @@ def _report_intervals(console: Console, drive: Drive) -> None:
     doubled = clean.time[rng.random(clean.time.size) < 0.03] + rng.integers(100_000, 1_000_000)
     bouncing = Pulses(np.sort(np.concatenate((clean.time, doubled))))
     grid = Grid(drive.start_ns, 0.1, int(SECONDS / 0.1))
-    direction, speed = np.zeros(grid.n), np.full(grid.n, 8.0)
+    across, speed = np.ones(grid.n, dtype=np.complex128), np.full(grid.n, 8.0)
     for words, pulses in (("", clean), (" of a contact that bounces", bouncing)):
         seconds = grid.seconds(pulses.time)
         least = best(partial(_intervals_read, seconds))
         for what, function in (
-            ("statistics", partial(interval_statistics, pulses, rotor, direction, speed, grid)),
+            ("statistics", partial(interval_statistics, pulses, rotor, across, speed, grid)),
             ("rates", partial(rate_series, pulses, rotor, grid)),
         ):
             spent = best(function)

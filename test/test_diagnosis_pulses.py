@@ -67,7 +67,7 @@ def test_of_very_many_edges_some_tell_as_much_as_all() -> None:
         grid = Grid(0, 0.2, int(turns * turn / 0.2))
         calm = np.zeros(grid.n)
         edges = Pulses(np.rint(time * 1e9).astype(np.int64))
-        found.append(interval_statistics(edges, cup, calm, calm + speed, grid))
+        found.append(interval_statistics(edges, cup, np.exp(1j * calm), calm + speed, grid))
     assert found[1][:3] == pytest.approx(found[0][:3], rel=0.05, abs=2e-4)
     assert found[0][1] > 0.001
     assert found[0][2] > 0.1

@@ -30,7 +30,7 @@ def unevenness(time: FloatArray) -> tuple[float, float]:
     assert isinstance(cup, Cup)
     speed = np.full(grid.n, 2.0 * np.pi * cup.calibration_distance / TURN)
     pulses = Pulses(np.round(time * 1e9).astype(np.int64))
-    found = interval_statistics(pulses, cup, np.zeros(grid.n), speed, grid)
+    found = interval_statistics(pulses, cup, np.ones(grid.n, dtype=complex), speed, grid)
     return float(found[2]), float(found[3])
 
 
@@ -130,3 +130,36 @@ def test_slots_are_counted_anew_after_a_silence() -> None:
         silent = (whole > 150.0) & (whole < 210.0)
         silent[np.flatnonzero(silent)[-1] + 1 + np.arange(lost)] = True
         assert unevenness(whole[~silent]) == pytest.approx(unevenness(whole), rel=0.1)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_beat_is_told_in_units_of_the_wind_across_whichever_way_the_rotor_turns(
+    way: float,
+) -> None:
+    rng = np.random.default_rng(8)
+    grid = Grid(0, 0.1, round(TURNS * TURN / 0.1))
+    gusts = rng.standard_normal((2, grid.n // 30 + 2))
+    across = np.asarray(0.1 * np.repeat(gusts[0] + 1j * gusts[1], 30)[: grid.n], dtype=complex)
+    time = edges(np.zeros(SLOTS))
+    place = np.minimum((time / grid.dt).astype(int), grid.n - 1)
+    angle = way * 2.0 * np.pi / SLOTS * np.arange(time.size)
+    amplitude = 0.004
+    # What an interval is longer by, in its own lengths.
+    longer = amplitude * (across[place] * np.exp(-1j * angle)).real
+    moved = time + np.cumsum(longer - longer.mean()) * TURN / SLOTS
+    rotor = STATION.instrument("cup").model_copy(update={"pulses_per_revolution": SLOTS})
+    assert isinstance(rotor, Cup)
+    speed = np.full(grid.n, 2.0 * np.pi * rotor.calibration_distance / TURN)
+    found = [
+        float(
+            interval_statistics(
+                Pulses(np.round(seen * 1e9).astype(np.int64)), rotor, across, speed, grid
+            )[4]
+        )
+        for seen in (time, moved)
+    ]
+    # A little less: beside gusts in the plane of rotation that hardly blow nothing is made of it.
+    power = np.mean(np.abs(across) ** 2)
+    known = power / (power + 0.05**2)
+    assert found[1] == pytest.approx(amplitude * known, rel=0.1)
+    assert found[0] < 0.2 * amplitude

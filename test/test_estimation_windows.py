@@ -127,11 +127,11 @@ def test_the_inverse_rotor_equation_gives_the_wind_back(
 ) -> None:
     y = ratio * speed
     forcing, slope, lift = rotor_forcing(CUP, 0.0, speed)
-    rate = rotor_acceleration(CUP, y, 0.0, forcing, slope, lift, 0.0, 1.04, 5.0)
+    rate = rotor_acceleration(CUP, y, 0.0, forcing, slope, lift, (0.0, 0.0), 1.04, 5.0)
     assert forcing_from_motion(CUP, y, rate, 0.0, 1.04, 5.0) == pytest.approx(speed, rel=1e-9)
     axial, transverse = speed * np.cos(angle), speed * np.sin(angle)
     forcing, slope, lift = rotor_forcing(PROPELLER, axial, transverse)
-    rate = rotor_acceleration(PROPELLER, y, 0.0, forcing, slope, lift, 0.0, 0.97, 5.0)
+    rate = rotor_acceleration(PROPELLER, y, 0.0, forcing, slope, lift, (0.0, 0.0), 0.97, 5.0)
     found = forcing_from_motion(PROPELLER, y, rate, angle, 0.97, 5.0)
     assert found == pytest.approx(speed, rel=1e-9)
 

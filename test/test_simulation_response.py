@@ -572,3 +572,39 @@ def test_an_unequal_rotor_pulses_once_per_turn_and_its_mean_speed_stays() -> Non
     assert half_swing == pytest.approx(expected, rel=0.02)
     fitted = np.polyfit(np.arange(late.size), turns, 1)[0] / uneven.dt * 0.2
     assert fitted == pytest.approx(plain.rotors["cup"].y[-1], rel=2e-3)
+
+
+def test_a_weak_blade_beats_with_what_blows_across_the_shaft() -> None:
+    # Three blades in a plane, each pulling as the rotor equation says of all of them, in the wind
+    # that its own way meets: A - y - h l/r cos. The first pulls less by a third.
+    forcing, across, length, distance, radius, weak = 6.0, 0.6, 0.08, 1.2, 0.08, 1.0 / 3.0
+    share = np.array([1.0 - weak, 1.0, 1.0]) / 3.0
+    places = 2.0 * np.pi / 3.0 * np.arange(3)
+
+    def turn(_: float, state: FloatArray) -> FloatArray:
+        y, psi = state
+        slip = forcing - y + across * length / radius * np.cos(psi + places)
+        return np.array([share @ slip * forcing / distance, y / length])
+
+    time = np.arange(0.0, 12.0, 0.002)
+    blades = solve_ivp(
+        turn, (0.0, 12.0), [forcing, 0.0], t_eval=time, max_step=0.002, rtol=1e-9, atol=1e-9
+    ).y
+    axis = np.array([1.0, 0.0, 0.0])
+    station = Station(
+        instruments=(
+            propeller(
+                axis=tuple(axis), mounted_on="", calibration_distance=length, a4=1.0,
+                distance_constant=distance, torque_harmonic=weak / 3.0,
+            ),
+        )
+    )  # fmt: skip
+    ours = respond(station, steady((forcing, across, 0.0))).rotors["propeller"]
+
+    def beat(y: FloatArray, psi: FloatArray) -> float:
+        late = slice(y.size // 2, None)
+        return float(2.0 * abs(np.mean((y - y[late].mean())[late] * np.exp(1j * psi[late]))))
+
+    expected = weak / 3.0 * forcing * across / (distance * forcing / length)
+    assert beat(*blades) == pytest.approx(expected, rel=0.03)
+    assert beat(ours.y, ours.psi) == pytest.approx(beat(*blades), rel=0.05)

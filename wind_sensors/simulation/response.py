@@ -16,11 +16,12 @@ import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.instruments.dynamics.rotor import RotorParameters
-from wind_sensors.instruments.dynamics.rotor_record import cup_axes, integrate_rotor
-from wind_sensors.instruments.dynamics.vane import integrate_vane, propeller_vane_axes
+from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
+from wind_sensors.instruments.dynamics.vane import integrate_vane
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.memory import DriveMemory
-from wind_sensors.simulation.wind_at_sensor import Flow, WindAtSensors
+from wind_sensors.simulation.rotor_axes import wind_in_rotor_axes
+from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.changes import Segment, segments
 from wind_sensors.station.model import (
     STANDARD_DENSITY,
@@ -356,7 +357,11 @@ class _Worker:
         )  # fmt: skip
 
         def rotated() -> tuple[FloatArray, FloatArray]:
-            axes = self._known(("axes", axes_key), lambda: self._axes(rotor))
+            carrier = self.angles.get(rotor.mounted_on) if isinstance(rotor, Propeller) else None
+            axes = self._known(
+                ("axes", axes_key),
+                lambda: wind_in_rotor_axes(self._station, rotor, self._winds, carrier),
+            )
             return self._rotated(rotor, parameters, start, axes)
 
         y, turned = self._known(key, rotated)
@@ -378,19 +383,6 @@ class _Worker:
             return self._winds.key(rotor, lean), carried
         return self._winds.key(rotor), repr(rotor.axis)
 
-    def _axes(self, rotor: Cup | Propeller) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Wind in a rotor's axes."""
-        if isinstance(rotor, Cup):
-            return cup_axes(self._winds.flow(rotor).wind)
-        if rotor.mounted_on:
-            carrier = self._station.instrument(rotor.mounted_on)
-            flow = self._winds.flow(rotor, carrier.tilt_deg)
-            phi, rate = self.angles[carrier.name]
-            return propeller_vane_axes(
-                flow.wind, phi, rate + flow.turning[:, 2], rotor.distance_to_vane_axis
-            )
-        return _fixed_axes(rotor, self._winds.flow(rotor))
-
     def _rotated(
         self,
         rotor: Cup | Propeller,
@@ -408,20 +400,3 @@ class _Worker:
             temperature, self._drive.dt, self._nodes[rotor.name],
             rate * rotor.calibration_distance, psi,
         )  # fmt: skip
-
-
-def _fixed_axes(propeller: Propeller, flow: Flow) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Wind in the axes of a propeller that does not turn with the wind."""
-    if propeller.axis is None:
-        raise UserError(
-            f"The propeller '{propeller.name}' has neither `mounted_on` nor `axis`.",
-            f"instruments.{propeller.name}",
-            "Name the vane that carries it, or give its axis as a unit vector in the sensor frame.",
-        )
-    axis = np.asarray(propeller.axis, dtype=np.float64)
-    axis = axis / np.linalg.norm(axis)
-    helper = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    across, up = flow.wind @ first, flow.wind @ np.cross(axis, first)
-    return flow.wind @ axis, np.hypot(across, up), np.arctan2(up, across)

@@ -39,6 +39,7 @@ from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 HIGHEST_FREQUENCY = 1.25
 """Series are compared below this frequency [Hz]; above, only spectra are."""
@@ -136,6 +137,8 @@ class View:
         expected: Deviation of each vane from `direction` that is expected [rad], by channel name.
             Deviations are counted on the turn that lies nearest to it.
         departure: Slow departure of a vane that stays far from there [rad], by channel name.
+        across: Of each propeller the wind in its plane of rotation at the bins, as a complex
+            number, relative to the slow wind.
         mended: Pulses of the rotors that lose some of them by chance, with those put back. All but
             the statistics of intervals, recorded and simulated, is seen with them.
     """
@@ -149,6 +152,7 @@ class View:
     mask: FloatArray | None = None
     expected: Mapping[str, FloatArray] = field(default_factory=dict)
     departure: Mapping[str, FloatArray] = field(default_factory=dict)
+    across: Mapping[str, ComplexArray] = field(default_factory=dict, repr=False)
     mended: Mapping[str, Pulses] = field(default_factory=dict, repr=False)
 
     @property
@@ -238,7 +242,7 @@ class View:
         statistics = (
             self._log_spectrum(cosine, self.grid.dt, channel, HIGHEST_OF_RATES),
             interval_statistics(
-                pulses, rotor, self.wind_from, self.speed, self.grid, self.mask
+                pulses, rotor, self._across(rotor), self.speed, self.grid, self.mask
             ),
             change_statistics(drawn, self._windy_changes),
         )
@@ -248,6 +252,14 @@ class View:
         cosine = self._cosine(series)
         seen = self._of_one(channel, series, cosine, statistics, drawn)
         return replace(seen, chance={channel.name: self._variance_by_chance(on_average, rotor)})
+
+    def _across(self, rotor: Rotor) -> ComplexArray:
+        """Wind across a rotor's shaft, as a complex number; across a cup's blows all of it."""
+        return self.across.get(rotor.name, self._directed)
+
+    @cached_property
+    def _directed(self) -> ComplexArray:
+        return np.asarray(np.exp(1j * self.wind_from))
 
     def _variance_by_chance(self, on_average: Pulses, rotor: Rotor) -> float:
         """Variance that edges drawn one by one add to each slow coefficient of a rate.

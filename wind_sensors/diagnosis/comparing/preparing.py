@@ -29,13 +29,15 @@ from wind_sensors.diagnosis.comparing.turning import slow_departure, where_vanes
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import drive_from_recording
 from wind_sensors.simulation.memory import DriveMemory
+from wind_sensors.simulation.rotor_axes import wind_in_rotor_axes
 from wind_sensors.simulation.wind_at_sensor import WindAtSensors
 from wind_sensors.station.doubles import without_doubles
-from wind_sensors.station.model import Rotor, Station
+from wind_sensors.station.model import Propeller, Rotor, Station
 from wind_sensors.station.signals import Angles, Pulses, Recording
 from wind_sensors.station.silence import tells
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 SHORTEST = 60.0
 """A recording needs this much time in common with its reference [s]."""
@@ -149,6 +151,7 @@ def prepare(
     comparison = replace(
         comparison,
         expected=_expected(comparison, angles),
+        across=_across(comparison, believed),
         measured=replace(empty, counted=empty.counted & turning),
     )
     answering = max(c.length for c in channels) / comparison.speed
@@ -204,6 +207,29 @@ def _expected(comparison: Comparison, angles: Mapping[str, Angles]) -> dict[str,
         for c in comparison.channels
         if c.kind == "vane_angle"
     }
+
+
+def _across(
+    comparison: Comparison, believed: Station
+) -> dict[str, ComplexArray]:
+    """Simulated wind in each propeller's plane of rotation, relative to the slow wind, by name."""
+    drive, grid = comparison.drive, comparison.grid
+    winds = WindAtSensors(believed, drive, comparison.memory)
+    at = np.arange(len(drive)) * drive.dt
+    turned = comparison.respond(believed).angles
+    out = {}
+    for channel in comparison.channels:
+        propeller = believed.instrument(channel.instrument)
+        if not isinstance(propeller, Propeller):
+            continue
+        carrier = turned.get(propeller.mounted_on)
+        _, across, direction = wind_in_rotor_axes(
+            believed, propeller, winds, None if carrier is None else (carrier.angle, carrier.rate)
+        )
+        x = np.interp(grid.centres, at, across * np.cos(direction))
+        y = np.interp(grid.centres, at, across * np.sin(direction))
+        out[propeller.name] = np.asarray((x + 1j * y) / comparison.speed, dtype=np.complex128)
+    return out
 
 
 def _beside_expected(comparison: Comparison) -> dict[str, FloatArray]:

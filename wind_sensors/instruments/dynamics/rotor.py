@@ -3,18 +3,25 @@
 With y = l s [m/s] (calibration distance times rotor rate) one first-order equation holds for all
 members (Kristensen (1994), (1), (2), (30); Kristensen et al. (2014), (58), (83); Jackson, (5))::
 
-    l0 I dy/dt = rho { (A - y) [a4 B + (1 - a4) y] + e A^2 cos(psi - alpha - psi_e) + E } - F sgn(y)
+    l0 I dy/dt = rho { (A - y) [a4 B + (1 - a4) y] + e A h cos(psi - alpha - psi_e) + E } - F sgn(y)
 
 A is the effective axial forcing, B the wind that sets the torque's slope (B = |A| for cups,
 B = U g(theta)/g(0) for a propeller), rho the air density relative to the calibration's, I the
-inertia relative to the healthy rotor's, e the once-per-revolution torque of an unequal rotor,
-E the second-order lift of the Kristensen (1994) forms, and F = U_s^2 the bearing friction.
+inertia relative to the healthy rotor's, e the once-per-revolution torque of an unequal rotor in a
+wind h across its shaft from alpha, E the second-order lift of the Kristensen (1994) forms, and
+F = U_s^2 the bearing friction.
+
+Across a cup's shaft blows the whole wind. Across a propeller's blows what its vane does not
+follow: a blade at radius r, which the wind h meets or leaves in its turn, is as fast as one at
+another rate for so long, (A - y - l h/r cos) in place of (A - y), and where all pull alike the sum
+over a turn is nought. One of n that pulls less by a share k leaves k l/(n r) A h cos, so that e is
+about k/n for blades that meet the wind at 45 degrees.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +29,10 @@ import numpy.typing as npt
 from wind_sensors.compiled import compiled, inlined
 
 FloatArray = npt.NDArray[np.float64]
+
+Forced: TypeAlias = tuple[float, float, float, float, float]
+"""A, B [m/s] and E [m^2/s^2] of `rotor_forcing`, and the wind across the shaft in the plane of
+rotation [m/s]."""
 
 CUP_EQUIVALENT = 0
 """Cup with the equivalent forcing of Kristensen et al. (2014), (83)."""
@@ -71,7 +82,8 @@ class RotorParameters(NamedTuple):
     inertia_factor: float
     """Moment of inertia relative to the healthy rotor's."""
     torque_harmonic: float
-    """Once-per-revolution torque e relative to the dynamic pressure (0 = healthy)."""
+    """Once-per-revolution torque e relative to the dynamic pressure, of a propeller to what the
+    wind across its shaft has of it (0 = healthy)."""
     torque_harmonic_phase: float
     """Rotor angle of the strong side [rad]."""
     breakaway: float
@@ -221,17 +233,19 @@ def rotor_acceleration(
     forcing: float,
     slope: float,
     lift: float,
-    lateral_angle: float,
+    across: tuple[float, float],
     density_ratio: float,
     temperature: float,
 ) -> float:
     """dy/dt [m/s^2] of the rotor equation; see the module's text for the terms.
 
+    `across` is the transverse wind in the plane of rotation [m/s].
+
     A rotor at rest stays at rest while the aerodynamic torque does not exceed the friction.
     """
     friction = _friction_of_fast(p, temperature) / density_ratio
     pace = density_ratio / (p.distance_constant * p.inertia_factor)
-    return _acceleration(p, y, psi - lateral_angle, forcing, slope, lift, friction, pace)
+    return _acceleration(p, y, psi, forcing, slope, lift, across[0], across[1], friction, pace)
 
 
 @inlined
@@ -242,6 +256,8 @@ def _acceleration(
     forcing: float,
     slope: float,
     lift: float,
+    across_x: float,
+    across_y: float,
     friction: float,
     pace: float,
 ) -> float:
@@ -250,15 +266,17 @@ def _acceleration(
     Args:
         p: Constants of the rotor.
         y: l s [m/s].
-        psi: Rotor angle from the transverse wind [rad].
+        psi: Rotor angle [rad].
         forcing, slope, lift: A, B [m/s] and E [m^2/s^2].
+        across_x, across_y: Transverse wind in the plane of rotation [m/s].
         friction: Of a rotor that turns fast, over the density ratio [m^2/s^2].
         pace: Density ratio over the length in which the rotor answers [1/m].
     """
     torque = (forcing - y) * (p.a4 * slope + (1.0 - p.a4) * y) + lift
     if p.torque_harmonic != 0.0:
-        strong = math.cos(psi - p.torque_harmonic_phase)
-        torque += p.torque_harmonic * forcing * forcing * strong
+        strong = psi - p.torque_harmonic_phase
+        pull = across_x * math.cos(strong) + across_y * math.sin(strong)
+        torque += p.torque_harmonic * forcing * pull
     if p.breakaway != 1.0 and _is_propeller(p):
         torque *= _share_of_torque(p, forcing, y)
     held = _at_rate(p, y, friction)
@@ -307,12 +325,25 @@ def advance_rotor(
     Returns:
         y [m/s] and psi [rad] at the end.
     """
-    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0])
-    a_1, b_1, e_1 = rotor_forcing(p, axial[1], transverse[1])
     return advance_forced(
-        p, y, psi, (a_0, b_0, e_0, lateral[0]), (a_1, b_1, e_1, lateral[1]),
-        density_ratio, temperature, dt,
+        p, y, psi, forced_by(p, axial[0], transverse[0], lateral[0]),
+        forced_by(p, axial[1], transverse[1], lateral[1]), density_ratio, temperature, dt,
     )  # fmt: skip
+
+
+@compiled
+def forced_by(p: RotorParameters, axial: float, transverse: float, lateral: float) -> Forced:
+    """What drives a rotor in a wind given in its axes, for `advance_forced`.
+
+    Args:
+        p: Constants of the rotor.
+        axial, transverse: Wind in rotor axes (see `rotor_forcing`) [m/s].
+        lateral: Direction of the transverse wind in the plane of rotation [rad].
+    """
+    a, b, e = rotor_forcing(p, axial, transverse)
+    if p.torque_harmonic == 0.0:
+        return a, b, e, 0.0, 0.0
+    return a, b, e, transverse * math.cos(lateral), transverse * math.sin(lateral)
 
 
 @compiled
@@ -320,8 +351,8 @@ def advance_forced(
     p: RotorParameters,
     y: float,
     psi: float,
-    start: tuple[float, float, float, float],
-    stop: tuple[float, float, float, float],
+    start: Forced,
+    stop: Forced,
     density_ratio: float,
     temperature: float,
     dt: float,
@@ -330,8 +361,8 @@ def advance_forced(
 
     Args:
         p, y, psi, density_ratio, temperature, dt: As in `advance_rotor`.
-        start, stop: A, B [m/s], E [m^2/s^2] of `rotor_forcing` and the direction of the transverse
-            wind [rad] at start and end.
+        start, stop: A, B [m/s], E [m^2/s^2] of `rotor_forcing` and the transverse wind in the plane
+            of rotation [m/s] at start and end; see `forced_by`.
 
     Returns:
         y [m/s] and psi [rad] at the end; NaN if the rotor runs away, which the quadratic torque
@@ -339,15 +370,13 @@ def advance_forced(
     """
     if not abs(y) < RUNAWAY_SPEED:
         return math.nan, math.nan
-    a_0, b_0, e_0, lateral_0 = start
-    a_1, b_1, e_1, lateral_1 = stop
+    a_0, b_0, e_0, x_0, y_0 = start
+    a_1, b_1, e_1, x_1, y_1 = stop
     fastest = density_ratio * max(abs(b_0), abs(b_1), abs(a_0), abs(a_1), abs(y))
     substeps = 1 + int(6.0 * dt * fastest / (p.distance_constant * p.inertia_factor))
     if p.torque_harmonic != 0.0:
         substeps = max(substeps, 1 + int(1.5 * dt * abs(y) / p.calibration_distance))
     step = dt / substeps
-    turn = lateral_1 - lateral_0
-    turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
     inverse_length = 1.0 / p.calibration_distance
     friction = _friction_of_fast(p, temperature) / density_ratio
     pace = density_ratio / (p.distance_constant * p.inertia_factor)
@@ -355,27 +384,27 @@ def advance_forced(
         f_0 = k / substeps
         f_h = (k + 0.5) / substeps
         f_1 = (k + 1.0) / substeps
-        l_0 = lateral_0 + f_0 * turn
-        l_h = lateral_0 + f_h * turn
-        l_1 = lateral_0 + f_1 * turn
         a_h = a_0 + f_h * (a_1 - a_0)
         b_h = b_0 + f_h * (b_1 - b_0)
         e_h = e_0 + f_h * (e_1 - e_0)
+        x_h = x_0 + f_h * (x_1 - x_0)
+        y_h = y_0 + f_h * (y_1 - y_0)
         k_1 = _acceleration(
-            p, y, psi - l_0, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0),
-            e_0 + f_0 * (e_1 - e_0), friction, pace,
+            p, y, psi, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0), e_0 + f_0 * (e_1 - e_0),
+            x_0 + f_0 * (x_1 - x_0), y_0 + f_0 * (y_1 - y_0), friction, pace,
         )  # fmt: skip
         y_2 = _not_beyond_rest(y + 0.5 * step * k_1, y, p.friction)
         psi_2 = psi + 0.5 * step * y * inverse_length
-        k_2 = _acceleration(p, y_2, psi_2 - l_h, a_h, b_h, e_h, friction, pace)
+        k_2 = _acceleration(p, y_2, psi_2, a_h, b_h, e_h, x_h, y_h, friction, pace)
         y_3 = _not_beyond_rest(y + 0.5 * step * k_2, y, p.friction)
         psi_3 = psi + 0.5 * step * y_2 * inverse_length
-        k_3 = _acceleration(p, y_3, psi_3 - l_h, a_h, b_h, e_h, friction, pace)
+        k_3 = _acceleration(p, y_3, psi_3, a_h, b_h, e_h, x_h, y_h, friction, pace)
         y_4 = _not_beyond_rest(y + step * k_3, y, p.friction)
         psi_4 = psi + step * y_3 * inverse_length
         k_4 = _acceleration(
-            p, y_4, psi_4 - l_1, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
-            e_0 + f_1 * (e_1 - e_0), friction, pace,
+            p, y_4, psi_4, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
+            e_0 + f_1 * (e_1 - e_0), x_0 + f_1 * (x_1 - x_0), y_0 + f_1 * (y_1 - y_0),
+            friction, pace,
         )  # fmt: skip
         y_next = y + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
         psi += step / 6.0 * (y + 2.0 * y_2 + 2.0 * y_3 + y_4) * inverse_length

@@ -7,15 +7,28 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.compiled import compiled
+from wind_sensors.compiled import compiled, inlined
 from wind_sensors.instruments.dynamics.rotor import (
     PROPELLER_JACKSON,
+    Forced,
     RotorParameters,
     advance_forced,
-    rotor_forcing,
+    forced_by,
 )
 
 FloatArray = npt.NDArray[np.float64]
+
+
+@inlined
+def _between(now: Forced, then: Forced, share: float) -> Forced:
+    """What drives a rotor after a share of the time from one instant to another."""
+    return (
+        now[0] + share * (then[0] - now[0]),
+        now[1] + share * (then[1] - now[1]),
+        now[2] + share * (then[2] - now[2]),
+        now[3] + share * (then[3] - now[3]),
+        now[4] + share * (then[4] - now[4]),
+    )
 
 
 @compiled
@@ -51,34 +64,25 @@ def integrate_rotor(
     n = axial.shape[0]
     y_out = np.empty((n - 1) * nodes + 1)
     psi_out = np.empty((n - 1) * nodes + 1)
-    a_0, b_0, e_0 = rotor_forcing(p, axial[0], transverse[0])
-    lateral_0 = lateral[0]
+    now = forced_by(p, axial[0], transverse[0], lateral[0])
     y = y_start
     if math.isnan(y):
-        y = a_0 if p.form == PROPELLER_JACKSON else max(a_0, 0.0)
+        y = now[0] if p.form == PROPELLER_JACKSON else max(now[0], 0.0)
     psi = psi_start
     y_out[0] = y
     psi_out[0] = psi
     position = 0
     for i in range(1, n):
-        a_1, b_1, e_1 = rotor_forcing(p, axial[i], transverse[i])
-        turn = lateral[i] - lateral_0
-        turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+        then = forced_by(p, axial[i], transverse[i], lateral[i])
         for k in range(nodes):
-            f_0 = k / nodes
-            f_1 = (k + 1.0) / nodes
             y, psi = advance_forced(
-                p, y, psi,
-                (a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0), e_0 + f_0 * (e_1 - e_0),
-                 lateral_0 + f_0 * turn),
-                (a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0), e_0 + f_1 * (e_1 - e_0),
-                 lateral_0 + f_1 * turn),
+                p, y, psi, _between(now, then, k / nodes), _between(now, then, (k + 1.0) / nodes),
                 density_ratio[i], temperature[i], dt / nodes,
             )  # fmt: skip
             position += 1
             y_out[position] = y
             psi_out[position] = psi
-        a_0, b_0, e_0, lateral_0 = a_1, b_1, e_1, lateral[i]
+        now = then
     return y_out, psi_out
 
 

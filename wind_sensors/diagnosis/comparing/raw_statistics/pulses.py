@@ -14,6 +14,7 @@ from wind_sensors.station.model import Cup, Propeller
 from wind_sensors.station.signals import Pulses
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 BoolArray = npt.NDArray[np.bool_]
 
 INTERVALS = 6
@@ -62,6 +63,9 @@ BLOCK_TURNS = 64
 """Of more edges only some are read, in blocks of so many turns evenly over the record: they tell as
 much as chance lets all of them tell."""
 
+HARDLY_ACROSS = 0.05
+"""A wind across the shaft of no more than this share of the slow wind shows no unequal blades."""
+
 SLOW_TURN = 2.5
 """A rotor that takes so many times longer for its turns than the wind asks for is about to stop:
 its intervals tell of the wind that it stops in."""
@@ -70,7 +74,7 @@ its intervals tell of the wind that it stops in."""
 def interval_statistics(
     pulses: Pulses,
     rotor: Cup | Propeller,
-    direction: FloatArray,
+    across: ComplexArray,
     speed: FloatArray,
     grid: Grid,
     mask: FloatArray | None = None,
@@ -80,7 +84,8 @@ def interval_statistics(
     Args:
         pulses: Edges.
         rotor: The rotor.
-        direction: Direction of the wind in the plane of rotation at the bins' centres [rad].
+        across: Wind in the plane of rotation at the bins' centres, relative to the slow wind, as a
+            complex number.
         speed: Slow wind speed at the bins [m/s]; what turns far slower does not count.
         grid: Bins of both.
         mask: Weight of the bins; intervals where it is below a half do not count.
@@ -89,13 +94,14 @@ def interval_statistics(
         Share of intervals over 1.6 and under 0.4 times their neighbourhood's mean; of the slots'
         mean relative intervals the scatter without, and the amplitude of, the part that swings
         once per revolution; of what departs from those means the amplitudes once and twice per
-        revolution locked to the wind's direction (0 where the pulses are too few to tell).
+        revolution locked to the wind across the shaft, if that were as strong as the slow wind,
+        whichever way round the rotor turns (0 where the pulses are too few to tell).
     """
     weight = np.ones(grid.n) if mask is None else mask
     usual = 2.0 * np.pi * rotor.calibration_distance / np.maximum(speed, 0.1)
     longest = SLOW_TURN * usual / rotor.pulses_per_revolution
     return _interval_statistics(
-        grid.seconds(pulses.time), rotor.pulses_per_revolution, direction, longest, weight, grid.dt
+        grid.seconds(pulses.time), rotor.pulses_per_revolution, across, longest, weight, grid.dt
     )
 
 
@@ -217,7 +223,7 @@ def _every(edges: int) -> int:
 def _interval_statistics(
     time: FloatArray,
     slots: int,
-    direction: FloatArray,
+    across: ComplexArray,
     longest: FloatArray,
     weight: FloatArray,
     dt: float,
@@ -255,11 +261,11 @@ def _interval_statistics(
     if slots < 3:
         return out
     time = _without_a_silence(time, slots)
-    out[2:] = _slot_statistics(time, slots, direction, longest, weight, dt)
+    out[2:] = _slot_statistics(time, slots, across, longest, weight, dt)
     tracked, _ = by_slot(time, slots)
     if tracked.size != time.size or np.any(np.isnan(tracked)):
         # Of two ways to number the slots, the wrong one makes them look more alike.
-        other = _slot_statistics(tracked, slots, direction, longest, weight, dt)
+        other = _slot_statistics(tracked, slots, across, longest, weight, dt)
         if other[0] ** 2 + 0.5 * other[1] ** 2 > out[2] ** 2 + 0.5 * out[3] ** 2:
             out[2:] = other
     return out
@@ -372,7 +378,7 @@ def by_slot(time: FloatArray, slots: int) -> tuple[FloatArray, BoolArray]:
 def _slot_statistics(
     time: FloatArray,
     slots: int,
-    direction: FloatArray,
+    across: ComplexArray,
     longest: FloatArray,
     weight: FloatArray,
     dt: float,
@@ -382,13 +388,14 @@ def _slot_statistics(
     edges = time.size
     bins_per_second = 1.0 / dt
     last_bin = weight.size - 1
-    # By slot: number, deviation, and both times the wind's direction once and twice per turn.
+    # By slot: number, deviation, and both times the wind across once and twice per turn.
     number = np.zeros((slots, 5))
     total = np.zeros((slots, 5))
     squares = 0.0
     wind = np.empty((weight.size, 4))
-    wind[:, 0], wind[:, 1] = np.cos(direction), np.sin(direction)
-    wind[:, 2], wind[:, 3] = np.cos(2.0 * direction), np.sin(2.0 * direction)
+    wind[:, 0], wind[:, 1] = across.real, across.imag
+    wind[:, 2], wind[:, 3] = (across**2).real, (across**2).imag
+    power = np.zeros(2)
     first = slots // 2
     kept = 0
     block = BLOCK_TURNS * slots
@@ -411,6 +418,8 @@ def _slot_statistics(
             kept += 1
             number[slot, 0] += 1.0
             total[slot, 0] += deviation
+            power[0] += wind[place, 0] ** 2 + wind[place, 1] ** 2
+            power[1] += wind[place, 2] ** 2 + wind[place, 3] ** 2
             for m in range(4):
                 number[slot, m + 1] += wind[place, m]
                 total[slot, m + 1] += deviation * wind[place, m]
@@ -429,9 +438,13 @@ def _slot_statistics(
         if m == 1:
             slot_cos, slot_sin = np.cos(2.0 * angle), np.sin(2.0 * angle)
         # What is fixed to the disc says nothing about the wind's direction.
-        away = total[:, 2 * m + 1] - means * number[:, 2 * m + 1]
-        across = total[:, 2 * m + 2] - means * number[:, 2 * m + 2]
-        along = np.sum(slot_cos * away + slot_sin * across)
-        aside = np.sum(slot_sin * away - slot_cos * across)
-        out[2 + m] = 2.0 * math.hypot(along, aside) / kept
+        x = total[:, 2 * m + 1] - means * number[:, 2 * m + 1]
+        y = total[:, 2 * m + 2] - means * number[:, 2 * m + 2]
+        one_way = math.hypot(
+            np.sum(slot_cos * x + slot_sin * y), np.sum(slot_sin * x - slot_cos * y)
+        )
+        other_way = math.hypot(
+            np.sum(slot_cos * x - slot_sin * y), np.sum(slot_sin * x + slot_cos * y)
+        )
+        out[2 + m] = 2.0 * max(one_way, other_way) / (power[m] + kept * HARDLY_ACROSS**2)
     return out
