@@ -17,7 +17,20 @@ from wind_sensors.station.signals import Angles, Pulses, Recording, Series, Time
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
+DAY = 86400.0
+"""[s]"""
+
 FEWEST_ROWS = 200
+"""So many common means are compared at least: a day and a half of ten-minute means. A choice; fewer
+do not make the blocks that held-out fits need."""
+
+MOST_ROWS = 8_000
+"""No more means are compared at a time; of more, evenly spaced ones are taken. A choice: neighbours
+share their weather and tell little new, while the time of a search grows with their number."""
+
+BLOWING = 3.0
+"""Wind in which every rotor turns and every vane moves [m/s]."""
+
 USUAL_INTENSITY = 0.12
 """Turbulence intensity where the recording has no deviations."""
 
@@ -154,6 +167,14 @@ def part(averages: Averages, rows: BoolArray | npt.NDArray[np.intp]) -> Averages
     )
 
 
+def thinned(good: BoolArray) -> BoolArray:
+    """Of the good rows no more than `MOST_ROWS`, evenly spaced; shape (n,) as `good`."""
+    step = max(1, int(np.ceil(np.count_nonzero(good) / MOST_ROWS)))
+    chosen = np.zeros(good.size, dtype=bool)
+    chosen[np.flatnonzero(good)[::step]] = True
+    return chosen
+
+
 def joined(several: Sequence[Averages]) -> Averages:
     """Recordings of one station as one, in the order of time.
 
@@ -191,6 +212,6 @@ def joined(several: Sequence[Averages]) -> Averages:
 def blocks_of(averages: Averages, fewest: int = 24) -> npt.NDArray[np.intp]:
     """Number of the block of each row: a week, or less where that leaves too few blocks."""
     span = float(averages.elapsed[-1] - averages.elapsed[0])
-    width = min(7.0 * 86400.0, span / fewest)
+    width = min(7.0 * DAY, span / fewest)
     number = np.floor((averages.elapsed - averages.elapsed[0]) / width).astype(np.intp)
     return np.unique(number, return_inverse=True)[1].astype(np.intp)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.means.averages import Averages, BoolArray, blocks_of
-from wind_sensors.diagnosis.means.pair import BOTH
+from wind_sensors.diagnosis.means.averages import BLOWING, Averages, BoolArray, blocks_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -19,7 +18,7 @@ def _columns(averages: Averages, others: list[str], own: list[str]) -> tuple[Flo
     logs = np.log(np.maximum(np.array([averages.speed[o] for o in others]), 0.1))
     good = np.isfinite(logs).all(axis=0)
     for name in own:
-        good &= np.isfinite(averages.speed[name]) & (averages.speed[name] > BOTH)
+        good &= np.isfinite(averages.speed[name]) & (averages.speed[name] > BLOWING)
     intensity = np.minimum.reduce([averages.intensity(o) for o in others])
     columns = np.vstack([np.ones(len(averages)), logs, intensity, intensity**2])
     return columns.T, good

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.means.averages import Averages, averages_of, joined
+from wind_sensors.diagnosis.means.averages import DAY, Averages, averages_of, joined
 from wind_sensors.diagnosis.means.pair import (
+    FEWEST_IN_CELL,
     SECTORS,
     SPEED_CLASSES,
     cells,
@@ -24,13 +25,8 @@ IndexArray = npt.NDArray[np.intp]
 WORKING = 0.5
 """Share of its means that a vane must deliver to be compared with healthy ones."""
 
-FEWEST_OF_A_KIND = 12
-"""Healthy means of one direction and speed that tell what is normal there."""
-
 MUCH = 0.05
 """Share of a record outside the healthy directions and speeds that is worth a word."""
-
-_DAY = 86400.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class Healthy:
         """What the healthy recordings do not tell about a record, for people."""
         found = []
         if len(self.names) == 1:
-            days = float(self.averages.elapsed[-1] - self.averages.elapsed[0]) / _DAY
+            days = float(self.averages.elapsed[-1] - self.averages.elapsed[0]) / DAY
             found.append(
                 f"What is normal was learnt from one recording of {days:.0f} days. How much "
                 "instruments differ from season to season it cannot tell: its own thirds stand in."
@@ -83,7 +79,7 @@ class Healthy:
     def _uncovered(self, averages: Averages) -> float:
         known = np.zeros((SECTORS, len(SPEED_CLASSES) - 1))
         np.add.at(known, _kinds(self.averages), 1.0)
-        return float(np.mean(known[_kinds(averages)] < FEWEST_OF_A_KIND))
+        return float(np.mean(known[_kinds(averages)] < FEWEST_IN_CELL))
 
 
 def _kinds(averages: Averages) -> tuple[IndexArray, IndexArray]:

@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.means.averages import (
+    BLOWING,
     FEWEST_ROWS,
     Averages,
     BoolArray,
     blocks_of,
     part,
+    thinned,
 )
 from wind_sensors.diagnosis.means.mean_response import mean_speed
 from wind_sensors.station.model import Station
@@ -23,11 +25,33 @@ FloatArray = npt.NDArray[np.float64]
 SLOWEST = 2.0
 """Below this wind [m/s] starting speeds decide, and pairs are not compared."""
 
-MOST_ROWS = 8_000
+SLOWEST_OF_TWO = 0.5
+"""The slower of two rotors must show as much [m/s]: one that stands says nothing of the wind."""
+
 SECTORS = 36
+"""Sectors of direction in what a function of direction and speed can be: 10 degrees, the standard
+deviation of a tower's wake. A choice; wider ones smear the wake, narrower ones hold fewer means."""
+
 SPEED_CLASSES = (0.0, 5.0, 8.0, 100.0)
-_FEWEST_IN_CELL = 12
+"""Edges of its classes of speed [m/s]: where friction and offsets matter, the middle, and where
+only gains and mounts are left. A choice; with more classes fewer cells are filled."""
+
+FEWEST_IN_CELL = 12
+"""So many means, two hours of them, give a cell a median of its own. A choice; with fewer the table
+follows the noise, with more it borrows from other speeds more often."""
+
+FEWEST_SHARED = 100
+"""So many means with wind must be common to two sensors before their usual difference is believed.
+A choice; it only keeps sensors that hardly ever worked together from being matched."""
+
+NOISE_CLASSES = 8
+"""Equally filled classes of speed in which the noise is taken; in between it is interpolated."""
+
+_FEWEST_IN_NOISE_CLASS = 20
+
 _SMALLEST_NOISE = 0.01
+"""Least noise of a difference [m/s], that two equal columns do not divide by nought: about the
+step in which means of speeds are written."""
 
 
 def pairs_of(averages: Averages) -> list[tuple[str, str]]:
@@ -37,8 +61,8 @@ def pairs_of(averages: Averages) -> list[tuple[str, str]]:
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             va, vb = averages.speed[a], averages.speed[b]
-            good = (va > BOTH) & (vb > BOTH)
-            if i != j and np.count_nonzero(good) > 100:
+            good = (va > BLOWING) & (vb > BLOWING)
+            if i != j and np.count_nonzero(good) > FEWEST_SHARED:
                 ratio = np.log(va[good] / vb[good])
                 scatter[i, j] = float(np.median(np.abs(ratio - np.median(ratio))))
     nearest = np.argmin(scatter, axis=1)
@@ -47,9 +71,6 @@ def pairs_of(averages: Averages) -> list[tuple[str, str]]:
         for i, j in enumerate(nearest)
         if i < j and nearest[j] == i and np.isfinite(scatter[i, j])
     ]
-
-
-BOTH = 3.0
 
 
 def direction_of(averages: Averages) -> FloatArray:
@@ -67,7 +88,7 @@ def direction_of(averages: Averages) -> FloatArray:
     for other in columns[1:]:
         both = np.isfinite(out) & np.isfinite(other)
         gap = ~np.isfinite(out) & np.isfinite(other)
-        if both.sum() > 100 and gap.any():
+        if both.sum() > FEWEST_SHARED and gap.any():
             turn = np.angle(np.mean(np.exp(1j * (out[both] - other[both]))))
             out[gap] = other[gap] + turn
     return np.asarray(out)
@@ -188,7 +209,7 @@ def _cell_medians(
     edges = np.searchsorted(number[order], np.arange(size + 1))
     table = np.full(size, np.nan)
     count = np.diff(edges)
-    for k in np.flatnonzero(count >= _FEWEST_IN_CELL):
+    for k in np.flatnonzero(count >= FEWEST_IN_CELL):
         table[k] = np.median(relative[order[edges[k] : edges[k + 1]]])
     return table.reshape(SECTORS, -1), count
 
@@ -205,11 +226,11 @@ def table_of(relative: FloatArray, speed: FloatArray, heading: FloatArray) -> Fl
 
 def noise_of(residual: FloatArray, speed: FloatArray) -> FloatArray:
     """Robust standard deviation of a residual as a function of the wind [m/s]."""
-    edges = np.quantile(speed, np.linspace(0.0, 1.0, 9))
+    edges = np.quantile(speed, np.linspace(0.0, 1.0, NOISE_CLASSES + 1))
     middles, widths = [], []
     for low, high in pairwise(edges):
         inside = (speed >= low) & (speed <= high)
-        if np.count_nonzero(inside) > 20:
+        if np.count_nonzero(inside) > _FEWEST_IN_NOISE_CLASS:
             chosen = residual[inside]
             middles.append(float(np.median(speed[inside])))
             widths.append(1.4826 * float(np.median(np.abs(chosen - np.median(chosen)))))
@@ -228,11 +249,9 @@ def pair_of(averages: Averages, first: str, second: str, standing: Standing | No
     heading = direction_of(averages)
     good = (
         np.isfinite(one) & np.isfinite(two) & np.isfinite(heading)
-        & (np.fmax(one, two) > SLOWEST) & (np.fmin(one, two) > 0.5)
+        & (np.fmax(one, two) > SLOWEST) & (np.fmin(one, two) > SLOWEST_OF_TWO)
     )  # fmt: skip
-    step = max(1, int(np.ceil(np.count_nonzero(good) / MOST_ROWS)))
-    chosen = np.zeros(len(averages), dtype=bool)
-    chosen[np.flatnonzero(good)[::step]] = True
+    chosen = thinned(good)
     rows = part(averages, chosen)
     intensity = np.minimum(rows.intensity(first), rows.intensity(second))
     blank = Pair(

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.means.averages import DAY
 from wind_sensors.diagnosis.means.pair import Pair
 from wind_sensors.diagnosis.means.vanes import VaneBench
 from wind_sensors.diagnosis.outcome import Panel
@@ -16,7 +17,6 @@ from wind_sensors.station.model import Station
 FloatArray = npt.NDArray[np.float64]
 
 _FEWEST = 8
-_DAY = 86400.0
 
 
 def _panel(
@@ -53,7 +53,7 @@ def of_pair(pair: Pair, station: Station, explained: Station) -> list[Panel]:
     before = 100.0 * pair.residual(station) / speed
     after = 100.0 * pair.residual(explained) / speed
     from_north = compass_from_yaw(pair.heading)
-    day = pair.averages.elapsed / _DAY
+    day = pair.averages.elapsed / DAY
     unit = "% of the wind"
     top = float(np.quantile(speed, 0.995))
     return [
@@ -72,6 +72,6 @@ def of_vane(found: VaneBench, station: Station, explained: Station) -> Panel:
     everything = bench.everything
     before = np.degrees(bench.residual(station, everything))
     after = np.degrees(bench.residual(explained, everything))
-    day = bench.elapsed / _DAY
+    day = bench.elapsed / DAY
     edges = np.linspace(day[0], day[-1] + 1e-6, 60)
     return _panel(f"{found.vane} - other vanes", "day", "deg", day, edges, before, after)

@@ -17,7 +17,22 @@ SMALLEST_KEPT = 0.1
 their place; below this share of it they are not worth a parameter."""
 
 CANDIDATES = 9
+"""So many templates are fitted and scored on held-out blocks. A choice: the time of a search is
+nearly in proportion to it; with fewer, an explanation that fits as well may not be tried."""
+
+SECTOR = 60.0
+"""Of an effect with a bearing one template in each sector so wide [deg] goes on: neighbouring ones
+are fitted to the same wake, and must not take the places of other effects. The wakes of a
+tower on opposite booms lie some 170 degrees apart."""
+
+PROMISING_T = 2.5
+"""Templates whose score is fewer standard errors over blocks are not fitted. A choice below what
+held-out blocks ask for (2.6 and more), for a fit improves on the template; a larger one would leave
+out explanations whose template is a poor likeness."""
+
 DRAWS = 999
+BATCH = 111
+"""Of the sign flips, so many are drawn at a time, that their scores fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +120,8 @@ def screen(
     centred = scores - amplitude[:, None] * powers
     spread = np.sqrt(np.sum(centred**2, axis=1)) + 1e-12
     exceed = 0
-    for _ in range(0, DRAWS, 111):
-        signs = rng.choice((-1.0, 1.0), (111, bench.blocks))
+    for drawn in range(0, DRAWS, BATCH):
+        signs = rng.choice((-1.0, 1.0), (min(BATCH, DRAWS - drawn), bench.blocks))
         null = np.abs(signs @ centred.T) / spread
         exceed += int(np.count_nonzero(null.max(axis=1) >= best))
     p = (exceed + 1.0) / (DRAWS + 1.0)
@@ -114,9 +129,9 @@ def screen(
     found: dict[tuple[object, ...], Candidate] = {}
     for k in np.argsort(-gain):
         term, size = rows[k][2], float(amplitude[k])
-        sector = round(term.values.get("bearing_from", 0.0) / 60.0) % 6
+        sector = round(term.values.get("bearing_from", 0.0) / SECTOR) % round(360.0 / SECTOR)
         key = (*term.key, term.interval == ALWAYS, sector)
-        if t[k] < 2.5 or key in found:
+        if t[k] < PROMISING_T or key in found:
             continue
         values = {}
         for parameter in term.effect.parameters:

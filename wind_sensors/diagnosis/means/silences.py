@@ -8,12 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from wind_sensors.diagnosis.means.averages import Averages, BoolArray
+from wind_sensors.diagnosis.means.averages import BLOWING, Averages, BoolArray
 
 FloatArray = npt.NDArray[np.float64]
-
-BLOWING = 3.0
-"""Wind in which every rotor turns and every vane moves [m/s]."""
 
 LONGEST_REPEAT = 18
 """So many equal means in a blowing wind do not happen to a sensor that works."""
@@ -23,8 +20,14 @@ COLD = 1.5
 WARM = 5.0
 
 FAMILY_P = 0.05
+"""Probability that episodes on any rotor of the mast fall into the cold by chance."""
+
 SLOWED = 0.12
+"""A rotor is slow where it lags by this share of the wind: beyond what mounts and turbulence do to
+a mean. A choice; a smaller one finds thinner ice and more of the wind's own differences."""
+
 SHORTEST_EPISODE = 3
+"""So many slow means in a row, half an hour, are an episode: ice does not come and go in less."""
 
 
 @dataclass(frozen=True)

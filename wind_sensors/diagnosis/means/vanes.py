@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
-from wind_sensors.diagnosis.means.averages import Averages, BoolArray, blocks_of, part
+from wind_sensors.diagnosis.means.averages import Averages, BoolArray, blocks_of, part, thinned
 from wind_sensors.diagnosis.means.bench import Bench
 from wind_sensors.diagnosis.means.mean_response import mean_heading
-from wind_sensors.diagnosis.means.pair import MOST_ROWS, noise_of
+from wind_sensors.diagnosis.means.pair import FEWEST_IN_CELL, noise_of
 from wind_sensors.motion.frames import wrap
 from wind_sensors.station.model import Station
 
@@ -23,6 +23,12 @@ WINDY = 4.0
 """Vanes are compared above this wind [m/s]; below it their directions wander apart."""
 
 SECTORS = 12
+"""Sectors of direction in which vanes have a usual difference: 30 degrees, for a mount and an
+eccentric disc turn a vane once or twice a turn. A choice; narrower ones follow the noise."""
+
+FEWEST_COMMON = 500
+"""So many means, half a week of them, two vanes must share. A choice; with fewer, single days
+decide how far the wind's own turning with height wanders."""
 
 
 @dataclass(frozen=True)
@@ -69,21 +75,17 @@ def vane_bench(
 ) -> VaneBench | None:
     """A vane against the mean of the others where all work; None: too few such rows."""
     others = [n for n in averages.heading if n != vane]
-    usable = [
-        n for n in others
-        if np.count_nonzero(np.isfinite(averages.heading[n] + averages.heading[vane])) > 500
-    ]  # fmt: skip
+    shared = {n: np.isfinite(averages.heading[n] + averages.heading[vane]) for n in others}
+    usable = [n for n in others if np.count_nonzero(shared[n]) > FEWEST_COMMON]
     if not usable:
         return None
     speed = np.nanmax(np.array(list(averages.speed.values())), axis=0)
     good = np.isfinite(averages.heading[vane]) & (speed > WINDY)
     for name in usable:
         good &= np.isfinite(averages.heading[name])
-    if np.count_nonzero(good) < 500:
+    if np.count_nonzero(good) < FEWEST_COMMON:
         return None
-    step = max(1, int(np.ceil(np.count_nonzero(good) / MOST_ROWS)))
-    chosen = np.zeros(len(averages), dtype=bool)
-    chosen[np.flatnonzero(good)[::step]] = True
+    chosen = thinned(good)
     rows = part(averages, chosen)
     heading = _direction(rows, usable)
     difference = np.asarray(wrap(rows.heading[vane] - heading))
@@ -114,7 +116,9 @@ def vane_standing(averages: Averages, station: Station, vane: str) -> VaneStandi
     overall = float(np.median(found.difference))
     table = np.array(
         [
-            np.median(found.difference[sector == s]) if np.sum(sector == s) > 12 else overall
+            np.median(found.difference[sector == s])
+            if np.sum(sector == s) > FEWEST_IN_CELL
+            else overall
             for s in range(SECTORS)
         ]
     )
