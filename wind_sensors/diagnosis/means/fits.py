@@ -30,6 +30,7 @@ def fit(
         fixed: Terms that stay as they are.
         free: Terms to fit.
         rows: Rows that count.
+        rounds: So many steps are taken at most.
     """
     terms = list(free)
     names = [(k, p) for k, term in enumerate(terms) for p in term.effect.parameters]
@@ -92,6 +93,7 @@ def held_out(
         bench: Rows.
         fixed: For each half the terms as fitted there before.
         free: Terms to fit in each half.
+        rounds: So many steps each fit takes at most.
     """
     cost = np.zeros(bench.blocks)
     fits = []
@@ -105,9 +107,7 @@ def held_out(
     return cost, fits
 
 
-def intervals(
-    bench: Bench, terms: Sequence[Term], seed: int = 1
-) -> list[dict[str, tuple[float, float]]]:
+def intervals(bench: Bench, terms: Sequence[Term]) -> list[dict[str, tuple[float, float]]]:
     """95 % intervals of all parameters, from the scatter of their scores over blocks."""
     names = [(k, p) for k, term in enumerate(terms) for p in term.effect.parameters]
     if not names:
