@@ -89,6 +89,10 @@ def test_motion_is_found_where_the_station_leaves_it_out() -> None:
     assert share.high - share.low < 0.3
     assert finding.proof is not None
     assert finding.proof.excess_removed > 0.4
+    # Nobody knows how much of the misfit is gusts: the excess is all of it.
+    assert finding.proof.floor == 0.0
+    left = (finding.proof.after / finding.proof.before) ** 2
+    assert finding.proof.excess_removed == pytest.approx(1.0 - left)
     assert finding.proof.placebo_removed is not None
     assert finding.proof.placebo_removed < 0.2 * finding.proof.excess_removed
     assert outcome.station.platform is not None
@@ -104,12 +108,23 @@ def test_nothing_is_named_on_a_boat_as_described(seed: int) -> None:
 
 
 def test_a_turned_vane_is_not_told_from_a_compass_where_the_velocity_is_the_earths() -> None:
-    outcome = diagnose_latent(boat(3, vane_offset_deg=25.0, earth_axes=True))
+    recording = boat(3, vane_offset_deg=25.0, earth_axes=True)
+    outcome = diagnose_latent(recording)
     found = {f.term.effect.name: f for f in outcome.findings}
     assert {"vane_offset", "heading_deviation"} <= set(found)
     assert found["vane_offset"].set_number == found["heading_deviation"].set_number == 1
     assert found["vane_offset"].term.values["offset"] == pytest.approx(25.0, abs=5.0)
     assert outcome.verdict == "ambiguous"
+    assert outcome.station == recording.station
+    assert any("corrected station has none of it" in line for line in outcome.declined)
+
+
+def test_what_is_too_small_to_be_named_is_told_and_not_corrected() -> None:
+    recording = boat(3, share_in_file=0.8)
+    outcome = diagnose_latent(recording)
+    assert not outcome.findings
+    assert any("smaller than what is worth reporting" in line for line in outcome.declined)
+    assert outcome.station == recording.station
 
 
 def test_a_velocity_in_the_boats_axes_tells_the_vane_from_the_compass() -> None:

@@ -18,8 +18,10 @@ from wind_sensors.diagnosis.means.averages import averages_of, indicated_speed, 
 from wind_sensors.diagnosis.means.diagnose import diagnose_means
 from wind_sensors.diagnosis.means.healthy import learn_means
 from wind_sensors.diagnosis.means.mean_response import mean_speed
+from wind_sensors.diagnosis.outcome import outcome_json
 from wind_sensors.errors import UserError
 from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
+from wind_sensors.report.names import names_of
 from wind_sensors.report.outcome_page import outcome_page
 from wind_sensors.station.model import Cup, Station, Vane
 from wind_sensors.station.parameters import rotor_parameters
@@ -360,3 +362,85 @@ def test_several_healthy_recordings_are_one_with_gaps() -> None:
     assert both.speed["one_a"] == pytest.approx(whole.speed["one_a"][there])
     assert both.heading["vane_b"] == pytest.approx(whole.heading["vane_b"][there])
     assert np.diff(both.elapsed).max() == pytest.approx(302 * 600.0)
+
+
+def test_sets_of_vanes_are_numbered_after_those_of_pairs() -> None:
+    _, time, values = made(12)
+    values["one_b"] = values["one_b"] * 0.95
+    late = np.arange(ROWS) > ROWS // 2
+    values["vane_b"] = values["vane_b"] + np.radians(9.0) * late
+    vanes = ("vane_a", "vane_b")
+    recording = recording_of(
+        station_of(CUPS, vanes), time, {name: values[name] for name in CUPS},
+        {name: values[name] for name in vanes},
+    )  # fmt: skip
+    phases: dict[str, float] = {}
+    outcome = diagnose_means(recording, {}, progress=phases.__setitem__)
+    sets: dict[int, set[tuple[str, str]]] = {}
+    for f in outcome.findings:
+        sets.setdefault(f.set_number, set()).add(f.term.key)
+    assert sets == {
+        1: {("calibration_drift", "one_a"), ("calibration_drift", "one_b")},
+        2: {("vane_offset", "vane_a"), ("vane_offset", "vane_b")},
+    }
+    assert outcome.verdict == "ambiguous"
+    assert names_of(outcome.findings) == (
+        "calibration drift (one_a) or calibration drift (one_b), and vane offset (vane_a) or vane "
+        "offset (vane_b)"
+    )
+    assert phases["vane_b and the other vanes"] == 1.0
+    # Of two that disagree the corrected station must not turn the healthy one, and says so.
+    assert outcome.station == recording.station
+    assert [line for line in outcome.declined if "corrected station has none of it" in line] == [
+        f"set {number}, {together}: the corrected station has none of it, for the data do not say "
+        "what to correct."
+        for number, together in (
+            (1, "calibration drift (one_a) or calibration drift (one_b)"),
+            (2, "vane offset (vane_a) or vane offset (vane_b)"),
+        )
+    ]
+
+
+def test_the_corrected_station_holds_what_is_named_and_nothing_smaller() -> None:
+    station, time, values = made(11)
+    away = (np.degrees(values["heading"]) - 40.0 + 180.0) % 360.0 - 180.0
+    values["one_b"] = values["one_b"] * (1.0 - 0.2 * np.exp(-0.5 * (away / 9.0) ** 2))
+    values["two_a"] = 0.992 * values["two_a"]
+    outcome = diagnose_means(recorded(station, time, values), {})
+    (finding,) = outcome.findings
+    assert any("smaller than what is worth reporting" in line for line in outcome.declined)
+    for name in PAIRS[1]:
+        assert outcome.station.instrument(name) == station.instrument(name)
+    cup = outcome.station.instrument("one_b")
+    assert isinstance(cup, Cup)
+    (wake,) = cup.wake_shadows
+    assert wake.depth == pytest.approx(finding.term.values["depth"])
+    assert outcome.station == finding.term.planted(station)
+
+
+def test_what_nobody_computed_has_no_number() -> None:
+    station, time, values = made(16, 1500)
+    values["two_b"] = values["two_b"].copy()
+    values["two_b"][1000:] = 0.0
+    outcome = diagnose_means(recorded(station, time, values), {})
+    (stuck,) = outcome_json(outcome)["findings"]
+    assert stuck["effect"] == "stuck_sensor"
+    assert stuck["located"]["p"] is None
+    assert stuck["located"]["share"] is None
+    assert "p =" not in outcome_page(outcome)
+    assert outcome.station == outcome.findings[0].term.planted(station)
+
+
+def test_a_vane_is_not_proved_against_its_own_fit() -> None:
+    station, time, values = made(14)
+    _, _, before = made(114)
+    # An eccentric disc with two lobes is in no catalogue: most of it is left.
+    lobes = np.radians(5.0) * np.sin(2.0 * values["heading"])
+    values["vane_b"] = values["vane_b"] + np.radians(7.0) + lobes
+    normal = learn_means([(recorded(station, time, before), {})])
+    (finding,) = diagnose_means(recorded(station, time, values), {}, normal).findings
+    proof = finding.proof
+    assert proof is not None
+    assert proof.floor == 0.0
+    assert proof.excess_removed == pytest.approx(1.0 - (proof.after / proof.before) ** 2)
+    assert proof.excess_removed < 0.95

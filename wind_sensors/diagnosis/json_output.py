@@ -67,7 +67,7 @@ def finding_json(finding: Finding, length: float) -> dict[str, Any]:
             "excess": _rounded(finding.located.excess),
             "unit": finding.located.unit,
             "share": _rounded(finding.share),
-            "p": finding.p,
+            "p": finding.p if np.isfinite(finding.p) else None,
         },
         "gain": _rounded(finding.gain) if finding.gain else None,
         "physics": term.effect.meaning,

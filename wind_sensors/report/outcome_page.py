@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from html import escape
+from math import isfinite
 
 from matplotlib.figure import Figure
 
@@ -75,6 +76,7 @@ def _finding(finding: Finding, station: Station) -> str:
         if located.excess
         else ""
     )
+    chance = f"; p = {finding.p:.3g}" if isfinite(finding.p) else ""
     sizes = "; ".join(size.text for size in sizes_of(finding, station))
     proof = ""
     if finding.proof is not None:
@@ -87,7 +89,7 @@ def _finding(finding: Finding, station: Station) -> str:
         )
     return (
         f"<p><b>{escape(finding.term.instrument)}</b>{together}: {escape(sizes)}.<br>"
-        f"Where: {escape(located.region.label)}{mismatch}; p = {finding.p:.3g}.{proof}</p>"
+        f"Where: {escape(located.region.label)}{mismatch}{chance}.{proof}</p>"
     )
 
 
@@ -137,7 +139,8 @@ def outcome_page(outcome: Outcome) -> str:
         f"{silent_paragraphs(outcome.silent)}</header>",
         _effects(outcome.findings, outcome.station),
         f"<section><h2>Before and after</h2><p class='muted'>Orange: recorded minus simulated as "
-        f"described; bars are two standard errors. Blue: with the named physics.</p>{figures}"
+        f"described; bars are two standard errors. Blue: with all that was fitted, also what is "
+        f"too small or too ambiguous for the corrected station.</p>{figures}"
         "</section>" if figures else "",
         _list("Seen, and not claimed", outcome.declined),
         f"<section><h2>What is left</h2><p>{escape(left)}</p></section>",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Effect
@@ -15,6 +14,7 @@ from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.latent.headings import (
     BLOCK,
+    FEWEST_BLOCKS,
     Felt,
     bench_of,
     felt_by,
@@ -22,11 +22,14 @@ from wind_sensors.diagnosis.latent.headings import (
     residual_of,
 )
 from wind_sensors.diagnosis.means.bench import Bench
+from wind_sensors.diagnosis.means.corrected import corrected, uncorrected
+from wind_sensors.diagnosis.means.detectable import smallest_size
+from wind_sensors.diagnosis.means.findings import last_set, too_small
 from wind_sensors.diagnosis.means.fits import fit, held_out, intervals
-from wind_sensors.diagnosis.means.search import Explained, Named, search
+from wind_sensors.diagnosis.means.proofs import proof_of, share_removed
+from wind_sensors.diagnosis.means.search import Explained, Named, needed_t, search, t_of
 from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
-from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import compass_from_yaw, heading_of
@@ -34,7 +37,6 @@ from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Recording
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 
 EFFECTS = (
     "platform_velocity", "platform_velocity_scale", "heading_deviation", "vane_offset",
@@ -58,7 +60,6 @@ NOT_SEPARABLE = {
         "unknown. Sighting the vane's mark along the keel separates them."
     ),
 }
-_DRAWS = 400
 
 
 def latent_effects(station: Station) -> dict[str, Effect]:
@@ -95,7 +96,7 @@ def diagnose_latent(
     station = recording.station
     spread = heading_spread(felt)
     turning = int(np.count_nonzero(spread > SEVERAL_HEADINGS))
-    if spread.size < 6:
+    if spread.size < FEWEST_BLOCKS:
         raise UserError(
             f"{spread.size} blocks of {BLOCK:.0f} s with wind and motion are too few.",
             recording.name,
@@ -111,8 +112,8 @@ def diagnose_latent(
     verdict = verdict_of(findings, Unexplained(1.0, 0.0, (), ""), 1.0)
     if verdict == "none" and turning < FEWEST_TURNING:
         verdict = "inconclusive"
-    whole, notes = _with_whole_motion(bench, explained)
-    kept = [t for t, n in zip(whole, explained.named, strict=True) if not _twins(n)]
+    to_plant, notes = _with_whole_motion(bench, explained, findings)
+    small = [too_small(t) for t in explained.terms if t.relative_size < 1.0]
     after = planted(station, explained.terms)
     return Outcome(
         recording=recording.name,
@@ -121,11 +122,11 @@ def diagnose_latent(
         findings=findings,
         unexplained=Unexplained(explained.p, 0.0, (), ""),
         smallest_detectable=_smallest(bench, after),
-        station=planted(station, kept),
+        station=corrected(station, to_plant),
         length=(recording.stop - recording.start) * 1e-9,
         reference=f"latent: the earth wind, constant with a trend within {BLOCK:.0f} s; "
         f"{turning} of {spread.size} blocks show several headings",
-        declined=(*notes, *declined),
+        declined=(*notes, *small, *declined, *uncorrected(findings)),
         panels=_panels(felt, station, after),
     )
 
@@ -139,35 +140,31 @@ def _twins(named: Named) -> dict[tuple[str, str], tuple[Term, float]]:
     }
 
 
-def _with_whole_motion(bench: Bench, explained: Explained) -> tuple[list[Term], tuple[str, ...]]:
-    """The terms, the motion taken as a whole where held-out blocks do not contradict."""
+def _with_whole_motion(
+    bench: Bench, explained: Explained, findings: Sequence[Finding]
+) -> tuple[list[Finding], tuple[str, ...]]:
+    """The findings, the motion taken as a whole where held-out blocks do not contradict."""
     out, notes = [], []
-    needed = float(stats.t.ppf(0.995, bench.blocks - 1))
-    for term in explained.terms:
-        if term.effect.name != "platform_velocity":
-            out.append(term)
+    needed = needed_t(bench)
+    for finding in findings:
+        if finding.term.effect.name != "platform_velocity" or finding.set_number:
+            out.append(finding)
             continue
-        whole = replace(term, values={"velocity_share": 1.0})
-        rest = [t for t in explained.terms if t is not term]
+        whole = replace(finding.term, values={"velocity_share": 1.0})
+        rest = [t for t in explained.terms if t is not finding.term]
         cost, _ = held_out(bench, [(whole,), (whole,)], rest)
-        behind = cost - explained.cost[-1]
-        t = float(behind.mean() / max(np.std(behind, ddof=1) / np.sqrt(behind.size), 1e-9))
-        fitted = term.values["velocity_share"]
+        t = t_of(cost - explained.cost[-1])
+        fitted = finding.term.values["velocity_share"]
         if t < needed:
-            out.append(whole)
+            out.append(replace(finding, term=whole))
             notes.append(
                 f"a velocity share other than 1: the fit of {fitted:.2f} is not better than the "
                 f"whole motion on held-out blocks (t = {t:.1f}, {needed:.1f} needed); the "
                 "corrected station has 1."
             )
         else:
-            out.append(term)
+            out.append(finding)
     return out, tuple(notes)
-
-
-def _share(gain: FloatArray, excess: FloatArray, picks: IntArray) -> float:
-    whole = float(excess[picks].sum())
-    return float(gain[picks].sum()) / whole if whole > 0.0 else 0.0
 
 
 def _placebo(felt: Felt, bench: Bench, term: Term) -> FloatArray | None:
@@ -198,27 +195,11 @@ def _findings(felt: Felt, bench: Bench, explained: Explained) -> tuple[Finding, 
         if term.relative_size < 1.0:
             continue
         before = explained.cost[k]
-        # What the best explanation leaves is the gusts' share: nobody can remove it.
-        excess = before - explained.cost[-1]
-        everything = np.arange(excess.size)
-        rng = np.random.default_rng(1)
-        drawn = [
-            _share(named.gain, before, rng.integers(0, excess.size, excess.size))
-            for _ in range(_DRAWS)
-        ]
-        low, high = np.quantile(drawn, (0.025, 0.975))
         placebo = _placebo(felt, bench, term)
-        proof = Proof(
-            before=float(np.sqrt(before.mean() * before.size / bench.noise.size)),
-            after=float(np.sqrt(explained.cost[k + 1].sum() / bench.noise.size)),
-            floor=float(np.sqrt(explained.cost[-1].sum() / bench.noise.size)),
-            excess_removed=_share(named.gain, before, everything),
-            low=float(low),
-            high=float(high),
-            placebo_removed=None if placebo is None else _share(placebo, before, everything),
-        )
+        # How much of the misfit is gusts, which nothing removes, nobody knows: shares are of all.
+        proof = proof_of(named.gain, before, bench.noise.size, placebo)
         twins = _twins(named)
-        number = 1 + max((f.set_number for f in out), default=0) if twins else 0
+        number = 1 + last_set(out) if twins else 0
         found = residual_of(felt, bench.station, np.ones(len(felt), dtype=bool))
         region = Region(
             "apparent_wind", "heading", 0.0, 360.0, "between the headings within ten minutes"
@@ -233,8 +214,7 @@ def _findings(felt: Felt, bench: Bench, explained: Explained) -> tuple[Finding, 
         others += tuple((t.effect.name, t.instrument, b) for t, b in named.others[:4])
         out.append(
             Finding(
-                term, parameters, place, proof.excess_removed, max(named.p, 0.001), others,
-                proof, number,
+                term, parameters, place, proof.excess_removed, named.p, others, proof, number,
             )
         )  # fmt: skip
         for other, behind in twins.values():
@@ -244,7 +224,7 @@ def _findings(felt: Felt, bench: Bench, explained: Explained) -> tuple[Finding, 
             }
             out.append(
                 Finding(
-                    other, values, place, proof.excess_removed, max(named.p, 0.001),
+                    other, values, place, proof.excess_removed, named.p,
                     ((term.effect.name, term.instrument, -behind),), None, number,
                 )
             )  # fmt: skip
@@ -276,12 +256,11 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
             f"({limits[p.name][0]:.2f} to {limits[p.name][1]:.2f}) {p.unit}".removesuffix(" 1")
             for p in effect.parameters
         )
-        share = 100.0 * float(gain.sum()) / float(base.sum())
-        error = float(np.std(gain, ddof=1) / np.sqrt(gain.size))
-        t = float(gain.mean()) / max(error, 1e-9)
+        share = 100.0 * share_removed(gain, base, np.zeros(base.size))
         lines.append(
             f"{name.replace('_', ' ')}: the best fit is {values}; on held-out blocks it changes "
-            f"the misfit by {-share:+.1f} % (t = {t:.1f}), which is no ground for a correction."
+            f"the misfit by {-share:+.1f} % (t = {t_of(gain):.1f}), which is no ground for a "
+            "correction."
         )
     platform = station.platform
     for pair, text in NOT_SEPARABLE.items():
@@ -293,22 +272,14 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
 
 
 def _smallest(bench: Bench, station: Station) -> dict[str, SmallestSize]:
-    """Sizes that the record would have shown, at 3.3 standard errors over blocks."""
+    """Sizes of the motion and of the compass that the record would have shown, by effect."""
     effects = latent_effects(station)
+    change = bench.change(station)
     found = {}
     for name in ("platform_velocity", "heading_deviation"):
-        effect = effects[name]
-        term = Term(effect, PLATFORM, effect.templates[0])
-        g = bench.residual(term.planted(station), bench.everything) - bench.residual(
-            station, bench.everything
-        )
-        psi = bench.white(station, bench.everything)
-        scores = np.bincount(bench.block, psi * g / bench.noise, bench.blocks)
-        error = float(np.sqrt(np.sum(scores**2)) / max(float(np.sum((g / bench.noise) ** 2)), 1e-9))
-        parameter = effect.parameters[0]
-        moved = abs(effect.templates[0][parameter.name] - (parameter.healthy or 0.0))
-        found[f"{name}/{PLATFORM}"] = SmallestSize(
-            3.3 * error * moved, parameter.unit, parameter.name
+        term = Term(effects[name], PLATFORM, effects[name].templates[0])
+        found[f"{name}/{PLATFORM}"] = smallest_size(
+            bench, station, term, change(term.planted(station))
         )
     return found
 

@@ -35,6 +35,8 @@ BLOCK = 600.0
 """Length of a block of steady, or steadily changing, wind [s]."""
 
 FEWEST_BLOCKS = 6
+"""A record has at least so many blocks: an hour. With fewer, no half is left to be scored on."""
+
 FEWEST_BINS = 40
 """A block with fewer bins is left out."""
 
@@ -172,7 +174,7 @@ def affine(felt: Felt, station: Station) -> tuple[ComplexArray, ComplexArray, Co
 
 
 def _explained(felt: Felt, station: Station, rows: BoolArray) -> ComplexArray:
-    """Simulated apparent wind in the best slowly changing wind, block by block."""
+    """Simulated apparent wind [m/s] in the wind that fits each block best; NaN in other rows."""
     calm, east, north = affine(felt, station)
     out = np.full(len(felt), np.nan + 0j)
     for b in np.unique(felt.block[rows]):

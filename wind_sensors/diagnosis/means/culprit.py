@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.explaining.terms import ALWAYS
 from wind_sensors.diagnosis.means.averages import BLOWING, Averages, BoolArray, blocks_of
+from wind_sensors.diagnosis.means.healthy import Healthy
+from wind_sensors.diagnosis.means.search import Named
 
 FloatArray = npt.NDArray[np.float64]
 
+DECISIVE = 3.0
+"""The other heights decide between two rotors when the log-likelihoods differ by so much."""
+
 _FEWEST = 300
 _FEWEST_BLOCKS = 6
+"""So many means and blocks are needed on either side of a change, that its error is known."""
 
 
 def _columns(averages: Averages, others: list[str], own: list[str]) -> tuple[FloatArray, BoolArray]:
@@ -75,3 +84,56 @@ def likelihood_of_first(
             float(np.sqrt(2.0 * (np.var(now) / len(now) + np.var(then) / len(then)))),
         )
     return (move[first] ** 2 - move[second] ** 2) / (2.0 * error**2)
+
+
+def attributed(
+    named: Named,
+    healthy: Healthy | None,
+    averages: Averages,
+    pair: tuple[str, str],
+    others: list[str],
+) -> Named:
+    """The same finding on the rotor that the other heights point at, if they do.
+
+    Args:
+        named: A finding of the pair.
+        healthy: What is normal; None: nobody knows.
+        averages: Means of the recording.
+        pair: The two rotors.
+        others: Rotors of other heights.
+    """
+    effect = named.term.effect.name
+    if effect not in {"calibration_drift", "calibration_offset"}:
+        return named
+    mirror = [
+        (t, b) for t, b in named.equal
+        if t.effect.name == effect and t.instrument != named.term.instrument
+        and (t.interval == ALWAYS) == (named.term.interval == ALWAYS)
+    ]  # fmt: skip
+    if not mirror:
+        return named
+    first, second = pair
+    begin, end = named.term.interval
+    inside = averages.elapsed >= begin
+    if end is not None:
+        inside &= averages.elapsed < end
+    everything = np.ones(len(averages), dtype=bool)
+    if named.term.interval != ALWAYS:
+        before, rows = averages, (~inside, inside)
+    elif healthy is not None:
+        before, rows = healthy.averages, (np.ones(len(healthy.averages), dtype=bool), everything)
+    else:
+        return named
+    evidence = likelihood_of_first(before, averages, first, second, others, rows)
+    if evidence is None or abs(evidence) < DECISIVE:
+        return named
+    guilty = first if evidence > 0.0 else second
+    rest = tuple((t, b) for t, b in named.equal if t.instrument == guilty)
+    lost = tuple((t, b + abs(evidence)) for t, b in named.equal if t.instrument != guilty)
+    if guilty == named.term.instrument:
+        return replace(named, equal=rest, others=(*lost, *named.others))
+    other = mirror[0][0]
+    keep = tuple((t, b) for t, b in rest if t is not other)
+    return replace(
+        named, term=other, equal=keep, others=((named.term, abs(evidence)), *lost, *named.others)
+    )

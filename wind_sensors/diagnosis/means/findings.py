@@ -2,38 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
-from wind_sensors.diagnosis.means.averages import Averages
-from wind_sensors.diagnosis.means.bench import CLIP, Bench, halves, huber
+from wind_sensors.diagnosis.means.averages import DAY, Averages
+from wind_sensors.diagnosis.means.bench import Bench, FloatArray, block_sums, halves, huber
+from wind_sensors.diagnosis.means.detectable import smallest_size
 from wind_sensors.diagnosis.means.fits import fit, intervals
-from wind_sensors.diagnosis.means.pair import Pair, cells, table_of
+from wind_sensors.diagnosis.means.pair import SLOWEST, SPEED_CLASSES, Pair, cells, table_of
 from wind_sensors.diagnosis.means.pair_effects import rotor_effects
+from wind_sensors.diagnosis.means.proofs import proof_of, share_removed
 from wind_sensors.diagnosis.means.search import Explained, Named
 from wind_sensors.diagnosis.means.silences import COLD, WARM, Ice, Silence
 from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
-from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
+UNTOLD = float("nan")
+"""Stands for a number that nobody computed."""
 
-DAY = 86400.0
-MOST_LIKELY_BY_CHANCE = 1e-4
 SMALLEST_REMAINDER = 0.02
 """A remainder smaller than this share of the wind (rms over all means) is not worth a word."""
 
 WANDERING = 3.0
 """A vane's change must exceed so many weekly deviations of what is normal."""
-_DRAWS = 400
+
+CALM = SPEED_CLASSES[1]
+"""Friction and offsets show below this wind [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -62,66 +63,33 @@ class PairWork:
             table = table_of(residual[own] / speed[own], speed[own], pair.heading[own])
             sector, level = cells(speed[other], pair.heading[other])
             left = (residual[other] - table[sector, level] * speed[other]) / bench.noise[other]
-            cost += np.bincount(bench.block[other], huber(left), bench.blocks)
+            cost += block_sums(huber(left), bench.block[other], bench.blocks)
         return cost
 
     def smallest(self) -> dict[str, SmallestSize]:
-        """Sizes that this pair would have shown, at 3.3 standard errors over blocks."""
+        """Gain and offset that this pair would have shown, by effect and pair."""
         bench = self.bench
         base = planted(bench.station, self.explained.terms)
         change = bench.change(base)
-        psi = np.clip(bench.white(base, bench.everything), -CLIP, CLIP)
         effects = rotor_effects()
         found = {}
         for name in ("calibration_drift", "calibration_offset"):
-            effect = effects[name]
-            parameter = effect.parameters[0]
-            term = Term(effect, self.pair.second, effect.templates[0])
-            g = -change(term.planted(base)) / bench.noise
-            scores = np.bincount(bench.block, psi * g, bench.blocks)
-            error = float(np.sqrt(np.sum(scores**2))) / max(float(g @ g), 1e-9)
-            moved = abs(effect.templates[0][parameter.name] - (parameter.healthy or 0.0))
-            found[f"{name}/{self.pair.name}"] = SmallestSize(
-                3.3 * error * moved, parameter.unit, parameter.name
+            term = Term(effects[name], self.pair.second, effects[name].templates[0])
+            found[f"{name}/{self.pair.name}"] = smallest_size(
+                bench, base, term, change(term.planted(base))
             )
         return found
 
 
-def _share(gain: FloatArray, before: FloatArray, floor: FloatArray, picks: IntArray) -> float:
-    excess = float((before - floor)[picks].sum())
-    return float(gain[picks].sum()) / excess if excess > 0.0 else 0.0
-
-
-def _proof(
-    gain: FloatArray,
-    before: FloatArray,
-    floor: FloatArray,
-    rows: int,
-    runner_up: FloatArray | None,
-) -> Proof:
-    everything = np.arange(gain.size)
-    rng = np.random.default_rng(1)
-    drawn = [
-        _share(gain, before, floor, rng.integers(0, gain.size, gain.size)) for _ in range(_DRAWS)
-    ]
-    low, high = np.quantile(drawn, (0.025, 0.975))
-    return Proof(
-        before=float(np.sqrt(before.sum() / rows)),
-        after=float(np.sqrt(max(float((before - gain).sum()), 0.0) / rows)),
-        floor=float(np.sqrt(floor.sum() / rows)),
-        excess_removed=_share(gain, before, floor, everything),
-        low=float(low),
-        high=float(high),
-        placebo_removed=None
-        if runner_up is None
-        else _share(runner_up, before, floor, everything),
-    )
+def last_set(findings: Sequence[Finding]) -> int:
+    """Number of the last ambiguous set; 0 where there is none."""
+    return max((f.set_number for f in findings), default=0)
 
 
 def _estimates(term: Term, limits: dict[str, tuple[float, float]]) -> dict[str, Estimate]:
     out = {}
     for p in term.effect.parameters:
-        low, high = limits.get(p.name, (float("nan"), float("nan")))
+        low, high = limits.get(p.name, (UNTOLD, UNTOLD))
         out[p.name] = Estimate(term.values[p.name], low, high, p.unit)
     return out
 
@@ -155,8 +123,10 @@ def _place(work: PairWork, term: Term, before: FloatArray) -> Found:
             channel, "time", begin, last, f"from day {begin / DAY:.0f} to day {last / DAY:.0f}"
         )
     elif term.effect.name in {"bearing_friction", "calibration_offset"}:
-        inside = speed < 5.0
-        region = Region(channel, "speed", 2.0, 5.0, "wind from 2 to 5 m/s")
+        inside = speed < CALM
+        region = Region(
+            channel, "speed", SLOWEST, CALM, f"wind from {SLOWEST:g} to {CALM:g} m/s"
+        )
     else:
         inside = np.ones(speed.size, dtype=bool)
         region = Region(channel, "all", 0.0, float(speed.max()), "all winds")
@@ -166,12 +136,12 @@ def _place(work: PairWork, term: Term, before: FloatArray) -> Found:
 
 def findings_of_pair(
     work: PairWork, number: int
-) -> tuple[list[Finding], list[str], int, Unexplained]:
-    """Findings of a pair, what was declined, the last number of a set, and what is left.
+) -> tuple[list[Finding], list[str], Unexplained]:
+    """Findings of a pair, what was declined, and what is left.
 
     Args:
         work: The pair.
-        number: Of the last ambiguous set.
+        number: Of the last ambiguous set; those of the pair are numbered from the next one on.
     """
     bench, explained = work.bench, work.explained
     floor = np.minimum(work.floor(), explained.cost[-1])
@@ -185,7 +155,7 @@ def findings_of_pair(
             bench.everything,
         )
         if term.relative_size < 1.0:
-            notes.append(_small(work, term))
+            notes.append(f"{work.pair.name}: {too_small(term)}")
             continue
         equal = [
             (t, b) for t, b in named.equal
@@ -196,17 +166,16 @@ def findings_of_pair(
         others = tuple((t.effect.name, t.instrument, b) for t, b in named.others[:6])
         others = tuple((t.effect.name, t.instrument, b) for t, b in distinct.values()) + others
         place = _place(work, term, before)
-        share = _share(named.gain, explained.cost[0], floor, np.arange(named.gain.size))
-        proof = _proof(named.gain, explained.cost[k], floor, rows, named.runner_up)
+        share = share_removed(named.gain, explained.cost[0], floor)
+        proof = proof_of(named.gain, explained.cost[k], rows, named.runner_up, floor)
         set_number = 0
         if distinct:
             number += 1
             set_number = number
-        p = max(named.p, 0.001)
         out.append(
             Finding(
-                term, _estimates(term, limits), place, float(np.clip(share, 0.0, 1.0)), p,
-                others, proof, set_number,
+                term, _estimates(term, limits), place, float(np.clip(share, 0.0, 1.0)),
+                named.p, others, proof, set_number,
             )
         )  # fmt: skip
         rest = [t for j, t in enumerate(explained.terms) if j != k]
@@ -214,11 +183,11 @@ def findings_of_pair(
             (other,) = fit(bench, rest, (twin,), bench.everything)
             out.append(
                 Finding(
-                    other, _estimates(other, {}), _place(work, other, before), out[-1].share, p,
-                    ((term.effect.name, term.instrument, -behind),), None, set_number,
+                    other, _estimates(other, {}), _place(work, other, before), out[-1].share,
+                    named.p, ((term.effect.name, term.instrument, -behind),), None, set_number,
                 )
             )  # fmt: skip
-    return out, notes, number, _left(work, floor)
+    return out, notes, _left(work, floor)
 
 
 def _left(work: PairWork, floor: FloatArray) -> Unexplained:
@@ -243,14 +212,15 @@ def _left(work: PairWork, floor: FloatArray) -> Unexplained:
     return Unexplained(p, share, (), text)
 
 
-def _small(work: PairWork, term: Term) -> str:
+def too_small(term: Term) -> str:
+    """Why a term that explains held-out blocks is not named, for people."""
     values = ", ".join(
         f"{p.name.replace('_', ' ')} {term.values[p.name]:.3g} {p.unit}".removesuffix(" 1")
         for p in term.effect.parameters
     )
     return (
-        f"{work.pair.name}: {term.effect.name.replace('_', ' ')} of {term.instrument} ({values}) "
-        "improves held-out blocks, but is smaller than what is worth reporting."
+        f"{term.effect.name.replace('_', ' ')} of {term.instrument} ({values}) improves held-out "
+        "blocks, but is smaller than what is worth reporting."
     )
 
 
@@ -278,8 +248,8 @@ def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
             "stop": Estimate(end, end - step, end, "s"),
         },
         Found(region, float(silence.rows), 0.0, unit),
-        1.0,
-        MOST_LIKELY_BY_CHANCE,
+        UNTOLD,
+        UNTOLD,
         (),
         None,
     )
@@ -304,17 +274,29 @@ def finding_of_ice(averages: Averages, ice: Ice) -> Finding:
         term,
         {"gain": Estimate(ice.ratio, *ice.ratios, "1")},
         Found(region, float(ice.rows), missing, "m/s"),
-        1.0,
-        max(ice.p, MOST_LIKELY_BY_CHANCE),
+        UNTOLD,
+        ice.p,
         (),
         None,
     )
 
 
 def findings_of_vane(
-    found: VaneBench, explained: Explained, standing: VaneStanding | None, vanes: int
+    found: VaneBench, explained: Explained, standing: VaneStanding | None, number: int | None
 ) -> tuple[list[Finding], list[str]]:
-    """Findings of a vane against the others, and what was declined."""
+    """Findings of a vane against the others, and what was declined.
+
+    What a vane is compared with includes the wind's own turning with height, and nobody knows how
+    much of the misfit that is: the share that a finding removes is of all of it.
+
+    Args:
+        found: The vane.
+        explained: What the search says.
+        standing: What healthy recordings show of it, if there are any.
+        number: With one other vane, which may be the one that turned: of the last ambiguous set.
+            What the search of either finds first belongs to the set with the next number, and so
+            on. None: several others tell which one turned.
+    """
     bench = found.bench
     out: list[Finding] = []
     notes: list[str] = []
@@ -350,13 +332,10 @@ def findings_of_vane(
             Finding(
                 term, _estimates(term, limits[given + k]),
                 Found(region, float(named.gain.sum()), float(middle), "deg"),
-                float(named.gain.sum() / explained.cost[0].sum()), max(named.p, 0.001),
+                float(named.gain.sum() / explained.cost[0].sum()), named.p,
                 tuple((t.effect.name, t.instrument, b) for t, b in named.others[:4]),
-                _proof(
-                    named.gain, explained.cost[k], explained.cost[-1], bench.noise.size,
-                    named.runner_up,
-                ),
-                0 if vanes > 2 else 1,
+                proof_of(named.gain, explained.cost[k], bench.noise.size, named.runner_up),
+                0 if number is None else number + 1 + k,
             )
         )  # fmt: skip
     return out, notes

@@ -63,8 +63,8 @@ class Finding:
         parameters: With intervals, by name.
         located: Where the mismatch shows most; of what begins or ends inside the record, beside
             the other effects.
-        share: Share of the whole misfit that the effect removes.
-        p: Probability of the location's score on a healthy day.
+        share: Share of the whole misfit that the effect removes; NaN where none was fitted.
+        p: Probability of the location's score on a healthy day; NaN where nobody computed it.
         alternatives: Other effects and how far their log-likelihood lies behind.
         proof: On held-out blocks; None for a member of an ambiguous set that did not win.
         set_number: Number of the ambiguous set it belongs to, 0 for none.

@@ -47,8 +47,10 @@ class Proof:
     Attributes:
         before, after: Root mean square of the whitened residual on the scored blocks without and
             with the effects; 1 is the noise of a healthy day.
-        floor: The same on the fitted blocks with the effects.
-        excess_removed: Share of the excess misfit that the effects remove on the scored blocks.
+        floor: The same on the fitted blocks with the effects; without a measured reference what no
+            explanation can remove, 0 where nobody knows how much that is.
+        excess_removed: Share of the excess misfit, that above the floor, that the effects remove on
+            the scored blocks.
         low, high: 95 % block-bootstrap interval of that share.
         placebo_removed: Share that the next-best explanation removes; None: there was none.
         curve_removed: Share that smooth curves over the wind's speed remove, added to every channel
