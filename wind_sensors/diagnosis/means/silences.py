@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -133,10 +133,7 @@ def without_silences(averages: Averages, found: list[Silence]) -> Averages:
     for s in found:
         column = speed if s.sensor in speed else heading
         column[s.sensor][s.first : s.last + 1] = np.nan
-    return Averages(
-        averages.station, averages.time, averages.elapsed, averages.interval, speed, heading,
-        averages.deviation, averages.temperature, averages.density,
-    )  # fmt: skip
+    return replace(averages, speed=speed, heading=heading)
 
 
 def ice(averages: Averages, rotor: str, partner: str, expected: FloatArray) -> Ice | None:
@@ -179,7 +176,4 @@ def without_ice(averages: Averages, found: list[Ice], margin: int = 6) -> Averag
     for episode in found:
         for first, last in episode.episodes:
             speed[episode.rotor][max(first - margin, 0) : last + margin + 1] = np.nan
-    return Averages(
-        averages.station, averages.time, averages.elapsed, averages.interval, speed,
-        averages.heading, averages.deviation, averages.temperature, averages.density,
-    )  # fmt: skip
+    return replace(averages, speed=speed)
