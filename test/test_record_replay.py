@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -16,8 +17,12 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from nodes_harness import Graph, overrides
+from rosbags.rosbag2.storage_mcap import McapWriter
+from std_msgs.msg import String
 
+from wind_sensors.errors import UserError
 from wind_sensors.nodes.player import PlayerNode
+from wind_sensors.nodes.quality import input_quality, output_quality
 from wind_sensors.nodes.recorder import RecorderNode
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.recordings import load_station, read_recording, write_recording
@@ -154,3 +159,126 @@ def test_mistakes_end_with_status_two(
     assert process.returncode == 2, output
     assert told in output
     assert "Traceback" not in output
+
+
+def _readable(bag: Path) -> int:
+    """Messages that are in a bag by now."""
+    try:
+        return sum(len(topic.raw) for topic in read_bag(bag).topics.values())
+    except UserError:
+        return 0
+
+
+def test_a_killed_recorder_leaves_what_it_had_recorded(
+    graph: Graph, tmp_path: Path, original: Path
+) -> None:
+    target = tmp_path / "killed"
+    recording = _wind(
+        graph.domain, tmp_path, "record", "--station", "mast_cup_vane", "-o", str(target)
+    )
+    player = graph.add(
+        PlayerNode,
+        content=read_bag(original / "bag"),
+        topics=["/cup/pulses", "/vane/joint_states"],
+        rate=20.0,
+        with_clock=False,
+        wait_for_subscribers=1,
+    )
+    graph.spin(lambda: player.finished, at_most=40.0)
+    graph.spin(
+        lambda: _readable(target / "bag") == player.published,
+        at_most=20.0,
+        so_far=lambda: f"{_readable(target / 'bag')} of {player.published}",
+    )
+    assert not (target / "bag" / "metadata.yaml").exists()
+    recording.kill()
+    recording.communicate(timeout=20)
+    _assert_same_signals(read_recording(target), read_recording(original))
+
+
+def test_a_full_disk_ends_a_recording_in_words_and_keeps_what_it_has(
+    graph: Graph, tmp_path: Path, original: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "full"
+    recorder = graph.add(RecorderNode, folder=target, topics=["/cup/pulses"])
+    graph.add(
+        PlayerNode, content=read_bag(original / "bag"), topics=["/cup/pulses"],
+        with_clock=False, wait_for_subscribers=1,
+    )  # fmt: skip
+    graph.spin(lambda: _readable(target / "bag") > 0)
+    kept = _readable(target / "bag")
+
+    def refuse(self: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(McapWriter, "close_chunk", refuse)
+    with pytest.raises(UserError, match="No space left on device"):
+        graph.spin(lambda: False)
+    assert _readable(target / "bag") == kept
+    recorder.close()
+
+
+def _latched(graph: Graph, topic: str, texts: list[str]) -> Any:
+    """A node that has published some texts and keeps them for those who come late."""
+    node = graph.listener()
+    quality = output_quality(len(texts), latched=True)
+    node.latched = node.create_publisher(String, topic, quality)
+    for text in texts:
+        node.latched.publish(String(data=text))
+    return node
+
+
+def test_what_was_latched_is_recorded_and_latched_again(graph: Graph, tmp_path: Path) -> None:
+    target = tmp_path / "latched"
+    _latched(graph, "robot_description", ["first", "second"])
+    recorder = graph.add(RecorderNode, folder=target, topics=None)
+    graph.spin(lambda: recorder.counts.get("/robot_description") == 2)
+    recorder.close()
+
+    player = graph.add(
+        PlayerNode, content=read_bag(target / "bag"), topics=["/robot_description"],
+        rate=1000.0, with_clock=False,
+    )  # fmt: skip
+    graph.spin(lambda: player.finished)
+    late = graph.listener()
+    texts: list[str] = []
+    late.create_subscription(
+        String,
+        "/robot_description",
+        lambda message: texts.append(message.data),
+        input_quality(reliable=True, latched=True),
+    )
+    # The first publisher is there still: twice two.
+    graph.spin(lambda: len(texts) == 4, so_far=lambda: texts)
+    assert sorted(texts) == ["first", "first", "second", "second"]
+
+
+def test_of_a_killed_recorder_too_the_latched_topics_are_known(
+    graph: Graph, tmp_path: Path
+) -> None:
+    target = tmp_path / "killed"
+    _latched(graph, "robot_description", ["text"])
+    graph.add(RecorderNode, folder=target, topics=None)
+    graph.spin(lambda: _readable(target / "bag") == 1)
+    content = read_bag(target / "bag")
+    assert content.salvaged
+    assert content.topics["/robot_description"].latched
+
+
+def test_a_publisher_that_comes_back_as_best_effort_is_recorded(
+    graph: Graph, tmp_path: Path
+) -> None:
+    reliable = graph.listener()
+    first = reliable.create_publisher(String, "/text", output_quality())
+    recorder = graph.add(RecorderNode, folder=tmp_path / "restarted", topics=["/text"])
+    graph.spin(lambda: first.get_subscription_count() == 1)
+    graph.spin(lambda: first.publish(String(data="a")) or recorder.counts["/text"] > 0)
+    reliable.destroy_publisher(first)
+    again = graph.listener()
+    second = again.create_publisher(String, "/text", input_quality())
+    graph.spin(lambda: "/text" in recorder.notes)
+    before = recorder.counts["/text"]
+    graph.spin(lambda: second.publish(String(data="b")) or recorder.counts["/text"] > before)
+    recorder.close()
+    raw = read_bag(tmp_path / "restarted" / "bag").topics["/text"].raw
+    assert any(b"b" in message for message in raw)

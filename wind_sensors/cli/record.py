@@ -119,6 +119,8 @@ def show(
     console.print(table)
     for topic, reason in recorder.refused.items():
         console.print(f"not recorded: {topic}: {reason}")
+    for topic, note in recorder.notes.items():
+        console.print(f"note: {topic}: {note}")
     missing = [topic for topic in recorder.missing if topic in expected]
     if missing:
         console.print(f"nobody published: {', '.join(missing)}")

@@ -28,6 +28,9 @@ _NEVER_PUBLISHED = frozenset({"/clock", "/rosout", "/parameter_events"})
 class PlayerNode(Node):
     """Publishes the messages of a bag at their times of recording.
 
+    Every topic is offered as reliable, which any subscriber can match, and a topic that was latched
+    (transient local) is latched again: who comes late gets the messages so far.
+
     Args:
         content: The bag.
         topics: Topics to publish; None: all.
@@ -77,7 +80,7 @@ class PlayerNode(Node):
                 self,
                 message_class(content.topics[name].message_type),
                 name,
-                output_quality(_DEPTH),
+                output_quality(_DEPTH, latched=content.topics[name].latched),
             )
             for name in chosen
         ]

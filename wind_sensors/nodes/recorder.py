@@ -2,39 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import QoSReliabilityPolicy
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rclpy.qos import QoSPolicyKind
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import message_class
-from wind_sensors.nodes.quality import input_quality, subscribe
+from wind_sensors.nodes.offers import Request, most_offered, offers
+from wind_sensors.nodes.quality import OVERRIDABLE, input_quality, subscribe
 from wind_sensors.nodes.receipts import ReceiptSender
-from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.live_bag import LiveBag, keep_on_disk
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.writing import clear_target
 from wind_sensors.station.writing import station_to_yaml
 
 if TYPE_CHECKING:
+    from rclpy.duration import Duration
+    from rclpy.qos import QoSProfile
+    from rclpy.subscription import Subscription
     from rosbags.interfaces import Connection
 
     from wind_sensors.station.model import Station
 
 _DEPTH = 10_000
+_SECOND = 1_000_000_000
 _DISCOVERY_PERIOD = 0.05
+_OFFERS_PERIOD = 0.25
+"""Between looks at what the publishers of recorded topics offer [s]."""
+
+_PUT_DOWN_PERIOD = 1.0
+"""A killed recorder loses what came in so many seconds."""
+
 _NOT_SIGNALS = frozenset({"/clock", "/rosout", "/parameter_events"})
+
+
+@dataclass
+class _Heard:
+    """One topic that is recorded.
+
+    Attributes:
+        listen: Subscribes with what is asked for; which policies parameters may override.
+        request: What the newest subscription asks for.
+        is_fixed: A parameter states the reliability.
+        subscriptions: The newest one, and before it one that it takes the place of.
+    """
+
+    listen: Callable[[Request, Collection[QoSPolicyKind]], Subscription]
+    request: Request
+    is_fixed: bool = False
+    subscriptions: list[Subscription] = field(default_factory=list)
 
 
 class RecorderNode(Node):
     """Writes the messages of some topics, or of all, to a recording.
 
-    A topic is subscribed to when its first publisher is seen, reliably if all its publishers are
-    reliable. The time of recording is the node's clock.
+    A topic is subscribed to when its first publisher is seen, with as much reliability and
+    durability as all its publishers offer, so that latched messages come too. Where a publisher
+    comes later that offers less, the topic is subscribed to again. The time of recording is the
+    node's clock. A recorder that is killed loses the last second.
 
     Args:
         folder: The recording to write; must not exist unless `force`.
@@ -48,9 +87,11 @@ class RecorderNode(Node):
     Attributes:
         counts: Messages by topic.
         refused: Topics that could not be recorded, with the reason.
+        notes: Of topics that may lack messages, and why.
 
     Raises:
-        UserError: The folder exists, or cannot be written.
+        UserError: The folder exists, or cannot be written; the callbacks raise it too, when the
+            disk is full.
     """
 
     def __init__(
@@ -67,23 +108,28 @@ class RecorderNode(Node):
         super().__init__("recorder", **options)
         self.counts: dict[str, int] = {}
         self.refused: dict[str, str] = {}
+        self.notes: dict[str, str] = {}
+        self._heard: dict[str, _Heard] = {}
         self._depth = depth
-        self._types = typestore()
         self._wanted = (
             None if topics is None else {self.resolve_topic_name(topic): topic for topic in topics}
         )
-        self._folder = Path(folder)
-        self._writer = _open_bag(self._folder, station, force=force)
-        self._closed = False
+        self._bag = _open_bag(Path(folder), station, force=force)
         acknowledged = [self.resolve_topic_name(topic) for topic in receipts_for]
         self._receipts = (
             ReceiptSender(self, lambda: {t: self.counts.get(t, 0) for t in acknowledged})
             if acknowledged
             else None
         )
-        self._discovery = self.create_timer(
-            _DISCOVERY_PERIOD, self.discover, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._repeated = [
+            self.create_timer(period, task, clock=steady)
+            for period, task in (
+                (_DISCOVERY_PERIOD, self.discover),
+                (_OFFERS_PERIOD, self._adapt),
+                (_PUT_DOWN_PERIOD, self._bag.put_down),
+            )
+        ]
 
     def discover(self) -> None:
         """Subscribe to the wanted topics that have a publisher by now."""
@@ -105,40 +151,76 @@ class RecorderNode(Node):
         if others:
             self.refused[topic] = f"it carries several types: {', '.join(types)}"
             return
+        offered = offers(self, topic)
+        if not offered:
+            # The publisher that was counted has just gone.
+            return
         try:
             loaded = message_class(message_type)
-            connection = self._writer.add_connection(topic, message_type, typestore=self._types)
+            connection = self._bag.add_topic(topic, message_type, list(map(_as_recorded, offered)))
         except (UserError, KeyError) as problem:
             self.refused[topic] = f"its type {message_type} is not known here ({problem})"
             self.get_logger().warning(f"{topic} is not recorded: {self.refused[topic]}")
             return
         self.counts[topic] = 0
-        offers = [info.qos_profile for info in self.get_publishers_info_by_topic(topic)]
-        reliable = all(offer.reliability == QoSReliabilityPolicy.RELIABLE for offer in offers)
-        subscribe(
-            self,
-            loaded,
-            topic,
-            self._keeper(topic, connection),
-            input_quality(reliable=reliable, depth=self._depth),
-            raw=True,
-        )
+        keep = self._keeper(topic, connection)
 
-    def _keeper(self, topic: str, connection: Connection) -> Any:
+        def listen(request: Request, overridable: Collection[QoSPolicyKind]) -> Subscription:
+            quality = input_quality(**request._asdict(), depth=self._depth)
+            return subscribe(
+                self, loaded, topic, keep, quality, raw=True, overridable=overridable
+            )
+
+        request = most_offered(offered)
+        if not request.latched and any(most_offered([one]).latched for one in offered):
+            self.notes[topic] = (
+                "some of its publishers are transient local and some volatile; what was latched "
+                "earlier may be missing"
+            )
+            self.get_logger().warning(f"{topic}: {self.notes[topic]}.")
+        heard = self._heard[topic] = _Heard(listen, request)
+        heard.subscriptions.append(listen(request, OVERRIDABLE))
+        stated = self.get_parameter(f"qos_overrides.{topic}.subscription.reliability").value
+        heard.is_fixed = (stated == "reliable") != request.reliable
+        heard.request = request._replace(reliable=stated == "reliable")
+
+    def _adapt(self) -> None:
+        """Ask for less where a publisher has come that offers less, and otherwise sends nothing."""
+        for topic, heard in self._heard.items():
+            for replaced in heard.subscriptions[:-1]:
+                # It has had a round to hand over what it held, and its successor to be found.
+                self.destroy_subscription(replaced)
+            del heard.subscriptions[:-1]
+            offered = offers(self, topic)
+            if not offered:
+                continue
+            most = most_offered(offered)
+            reliable = heard.request.reliable and (most.reliable or heard.is_fixed)
+            request = Request(reliable, heard.request.latched and most.latched)
+            if request == heard.request:
+                continue
+            kept = [kind for kind in OVERRIDABLE if kind != QoSPolicyKind.RELIABILITY]
+            heard.subscriptions.append(heard.listen(request, kept))
+            self.notes[topic] = (
+                f"a publisher came after {self.counts[topic]} messages that offers less than "
+                f"{heard.request}; what it sent in its first half second may be missing"
+            )
+            self.get_logger().warning(f"{topic}: {self.notes[topic]}.")
+            heard.request = request
+
+    def _keeper(self, topic: str, connection: Connection) -> Callable[[bytes], None]:
         clock = self.get_clock()
 
         def keep(message: bytes) -> None:
-            if not self._closed:
+            if self._bag.is_open:
                 self.counts[topic] += 1
-                self._writer.write(connection, clock.now().nanoseconds, message)
+                self._bag.write(connection, clock.now().nanoseconds, message)
 
         return keep
 
     def close(self) -> None:
         """Finish the bag; later messages are ignored."""
-        if not self._closed:
-            self._closed = True
-            self._writer.close()
+        self._bag.close()
 
     def destroy_node(self) -> None:
         """Finish the bag and destroy the node."""
@@ -146,20 +228,32 @@ class RecorderNode(Node):
         super().destroy_node()
 
 
-def _open_bag(folder: Path, station: Station | None, *, force: bool) -> Writer:
+def _open_bag(folder: Path, station: Station | None, *, force: bool) -> LiveBag:
     clear_target(folder, force=force)
-    try:
+    with refused_in_words(folder, "recording"):
         folder.mkdir(parents=True, exist_ok=True)
+        keep_on_disk(folder.parent)
         if station is not None:
-            text = station_to_yaml(station)
-            (folder / STATION_FILE).write_text(text, encoding="utf-8")
-        writer = Writer(folder / BAG_FOLDER, version=9, storage_plugin=StoragePlugin.MCAP)
-        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-        writer.open()
-    except OSError as problem:
-        raise UserError(
-            f"the recording cannot be written ({problem.strerror}).",
-            str(folder),
-            "Choose another place with -o.",
-        ) from None
-    return writer
+            file = folder / STATION_FILE
+            file.write_text(station_to_yaml(station), encoding="utf-8")
+            keep_on_disk(file)
+    return LiveBag(folder / BAG_FOLDER)
+
+
+def _as_recorded(profile: QoSProfile) -> Qos:
+    """A publisher's quality of service as bags keep it."""
+    return Qos(
+        QosHistory(int(profile.history)),
+        profile.depth,
+        QosReliability(int(profile.reliability)),
+        QosDurability(int(profile.durability)),
+        _time(profile.deadline),
+        _time(profile.lifespan),
+        QosLiveliness(int(profile.liveliness)),
+        _time(profile.liveliness_lease_duration),
+        profile.avoid_ros_namespace_conventions,
+    )
+
+
+def _time(duration: Duration) -> QosTime:
+    return QosTime(*divmod(duration.nanoseconds, _SECOND))

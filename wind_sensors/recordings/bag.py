@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
+from rosbags.interfaces import (
+    ConnectionExtRosbag2,
+    MessageDefinition,
+    MessageDefinitionFormat,
+    Qos,
+    QosDurability,
+)
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
@@ -30,12 +36,14 @@ class TopicData:
         log_time: Time of recording of each message [ns].
         raw: The messages in CDR.
         count: Messages in the bag, whether they were read or not.
+        latched: A publisher kept its messages for subscribers that came late (transient local).
     """
 
     message_type: str
     log_time: list[int] = field(default_factory=list)
     raw: list[bytes] = field(default_factory=list)
     count: int = 0
+    latched: bool = False
 
 
 @dataclass
@@ -101,6 +109,8 @@ def _read(path: Path, wanted: Callable[[str], bool]) -> BagContent:
         for connection in reader.connections:
             data = content.topic(connection.topic, connection.msgtype, connection.msgdef)
             data.count += connection.msgcount
+            assert isinstance(connection.ext, ConnectionExtRosbag2)
+            data.latched |= _is_latched(connection.ext.offered_qos_profiles)
             appenders[connection.id] = (data.log_time.append, data.raw.append)
         chosen = [c for c in reader.connections if wanted(c.topic)]
         if not chosen:
@@ -153,9 +163,11 @@ def _salvaged(path: Path, wanted: Callable[[str], bool], problem: Exception) -> 
     for file in files:
         found = salvage(file)
         for message in sorted(found.messages, key=lambda message: message.time):
-            data = content.topic(message.topic, message.message_type, message.definition)
+            channel = message.channel
+            data = content.topic(channel.topic, channel.message_type, channel.definition)
             data.count += 1
-            if wanted(message.topic):
+            data.latched |= _is_latched(channel.offered)
+            if wanted(channel.topic):
                 data.log_time.append(message.time)
                 data.raw.append(message.raw)
         count = len(found.messages)
@@ -167,6 +179,10 @@ def _salvaged(path: Path, wanted: Callable[[str], bool], problem: Exception) -> 
         else:
             content.notes.append(f"{file.name}: {faults}")
     return content
+
+
+def _is_latched(offered: Sequence[Qos]) -> bool:
+    return any(one.durability == QosDurability.TRANSIENT_LOCAL for one in offered)
 
 
 def _register(types: Typestore, name: str, definition: MessageDefinition) -> None:

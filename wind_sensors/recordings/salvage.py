@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lz4.frame import LZ4FrameDecompressor
-from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
+from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat, Qos
+from rosbags.rosbag2.metadata import parse_qos
 
 if sys.version_info >= (3, 14):
     from compression import zstd
@@ -28,12 +29,19 @@ _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
 _FORMATS = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL}
 
 
-class SalvagedMessage(NamedTuple):
-    """One message that could be read."""
+class SalvagedChannel(NamedTuple):
+    """What a bag tells of one topic, with the quality of service of its publishers."""
 
     topic: str
     message_type: str
     definition: MessageDefinition
+    offered: tuple[Qos, ...]
+
+
+class SalvagedMessage(NamedTuple):
+    """One message that could be read."""
+
+    channel: SalvagedChannel
     time: int
     raw: bytes
 
@@ -79,7 +87,7 @@ def _salvage_mcap(data: bytes) -> Salvage:
         found.faults.append("the file does not begin like an mcap file")
         return found
     schemas: dict[int, tuple[str, MessageDefinition]] = {}
-    channels: dict[int, tuple[str, str, MessageDefinition]] = {}
+    channels: dict[int, SalvagedChannel] = {}
     complete = False
     for opcode, body in _records(data, len(_MAGIC), found.faults):
         if opcode == _CHUNK:
@@ -134,7 +142,7 @@ def _take_record(
     opcode: int,
     body: bytes,
     schemas: dict[int, tuple[str, MessageDefinition]],
-    channels: dict[int, tuple[str, str, MessageDefinition]],
+    channels: dict[int, SalvagedChannel],
     found: Salvage,
 ) -> None:
     cursor = _Cursor(body)
@@ -146,17 +154,37 @@ def _take_record(
         elif opcode == _CHANNEL:
             key, schema = cursor.number("H"), cursor.number("H")
             if schema in schemas:
-                channels[key] = (cursor.text(), *schemas[schema])
+                channel = SalvagedChannel(cursor.text(), *schemas[schema], _offers(cursor))
+                channels[key] = channel
         elif opcode == _MESSAGE:
-            channel = channels.get(cursor.number("H"))
+            sender = channels.get(cursor.number("H"))
             cursor.number("I")
             time = cursor.number("Q")
             cursor.number("Q")
-            if channel is not None:
+            if sender is not None:
                 raw = body[cursor.position :]
-                found.messages.append(SalvagedMessage(*channel, time, raw))
+                found.messages.append(SalvagedMessage(sender, time, raw))
     except EOFError:
         found.faults.append("a record is shorter than it says")
+
+
+def _offers(cursor: _Cursor) -> tuple[Qos, ...]:
+    """Quality of service in a channel's record, after its topic."""
+    cursor.text()
+    end = cursor.number("I") + cursor.position
+    metadata: dict[str, str] = {}
+    while cursor.position < end:
+        key = cursor.text()
+        metadata[key] = cursor.text()
+    return _qualities(metadata.get("offered_qos_profiles", ""))
+
+
+def _qualities(text: str) -> tuple[Qos, ...]:
+    try:
+        return tuple(parse_qos(text))
+    except Exception:
+        # Recorders have written them in several ways; the messages are worth more than they.
+        return ()
 
 
 def _salvage_sqlite(path: Path) -> Salvage:
@@ -166,18 +194,19 @@ def _salvage_sqlite(path: Path) -> Salvage:
         with sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True) as database:
             # Without this a file shorter than its header says is refused before it is read.
             database.execute("PRAGMA writable_schema = ON")
+            definitions = _definitions(database)
+            offers = _offers_in(database)
             topics = {
-                key: (name, kind)
+                key: SalvagedChannel(
+                    name, kind, definitions.get(kind, nothing), offers.get(key, ())
+                )
                 for key, name, kind in database.execute("SELECT id, name, type FROM topics")
             }
-            definitions = _definitions(database)
             rows = database.execute(
                 "SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY rowid"
             )
             for key, time, raw in rows:
-                name, kind = topics[key]
-                text = definitions.get(kind, nothing)
-                found.messages.append(SalvagedMessage(name, kind, text, int(time), bytes(raw)))
+                found.messages.append(SalvagedMessage(topics[key], int(time), bytes(raw)))
     except (sqlite3.Error, KeyError) as problem:
         found.faults.append(f"the file is damaged ({problem})")
     return found
@@ -192,5 +221,13 @@ def _definitions(database: sqlite3.Connection) -> dict[str, MessageDefinition]:
             name: MessageDefinition(_FORMATS.get(kind, MessageDefinitionFormat.NONE), text)
             for name, kind, text in rows
         }
+    except sqlite3.Error:
+        return {}
+
+
+def _offers_in(database: sqlite3.Connection) -> dict[int, tuple[Qos, ...]]:
+    try:
+        rows = database.execute("SELECT id, offered_qos_profiles FROM topics")
+        return {key: _qualities(text) for key, text in rows}
     except sqlite3.Error:
         return {}

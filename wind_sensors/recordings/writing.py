@@ -144,7 +144,16 @@ def clear_target(target: Path, *, force: bool) -> None:
         raise UserError(
             "this exists already.", str(target), "Choose another place with -o, or add --force."
         )
-    recorded = (target / STATION_FILE).exists() or (target / "metadata.yaml").exists()
+    # A recorder without a station leaves a bag alone, and a killed one no metadata.yaml in it.
+    recorded = any(
+        part.exists()
+        for part in (
+            target / STATION_FILE,
+            target / "metadata.yaml",
+            target / BAG_FOLDER / "metadata.yaml",
+            target / BAG_FOLDER / f"{BAG_FOLDER}.mcap",
+        )
+    )
     if not target.is_dir() or (any(target.iterdir()) and not recorded):
         raise UserError(
             "this is not a recording, so --force does not remove it.",
