@@ -166,6 +166,8 @@ def test_marine_sentences_flow_when_asked_for(graph: Graph) -> None:
         (Parameter("x", int, 1, ""), 5, 1.5),
         (Parameter("x", bool, True, ""), False, 1),
         (Parameter("x", str, "a", "", choices=("a", "b")), "b", "c"),
+        (Parameter("x", str, "WI", "", pattern="[A-Z]{2}"), "II", "TO*LONG,"),
+        (Parameter("x", str, "WI", "", pattern="[A-Z]{2}"), "II", "WI\n"),
         (Parameter("x", tuple, (), ""), [1, 2.5], "12"),
         (Parameter("x", float, None, ""), None, True),
         (Parameter("x", float, 1.0, ""), 1.0, None),

@@ -86,7 +86,7 @@ def _compass(attitude: FloatArray) -> FloatArray:
 
 def _declination(platform: Platform) -> float:
     if platform.heading_reference == "magnetic":
-        return float(np.radians(platform.magnetic_declination_deg))
+        return float(np.radians(platform.magnetic_declination_deg or 0.0))
     return 0.0
 
 

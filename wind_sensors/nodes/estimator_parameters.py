@@ -159,7 +159,14 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         "Publish NMEA 0183 MWV and MWD sentences on wind/nmea.",
         changeable=True,
     ),
-    Parameter("nmea_talker", str, "WI", "Talker of the sentences, two letters.", changeable=True),
+    Parameter(
+        "nmea_talker",
+        str,
+        "WI",
+        "Talker of the sentences, two capital letters.",
+        pattern="[A-Z]{2}",
+        changeable=True,
+    ),
     Parameter(
         "nmea_rate",
         float,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
@@ -27,6 +28,7 @@ class Parameter:
         description: What it means, with its unit in brackets.
         minimum, maximum: Inclusive limits of a number.
         choices: Accepted words; empty: any.
+        pattern: Regular expression of the accepted text; empty: any.
         changeable: Whether it can be set while the node runs.
     """
 
@@ -37,6 +39,7 @@ class Parameter:
     minimum: float | None = None
     maximum: float | None = None
     choices: tuple[str, ...] = ()
+    pattern: str = ""
     changeable: bool = False
 
     def accept(self, value: object) -> Value:
@@ -63,6 +66,8 @@ class Parameter:
                 raise ValueError(
                     f"'{self.name}' is one of {', '.join(self.choices)}, not '{value}'"
                 )
+            if self.pattern and not re.fullmatch(self.pattern, value):
+                raise ValueError(f"'{self.name}' has the form {self.pattern}, not '{value}'")
             return value
         if self.kind is tuple:
             if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
@@ -114,7 +119,9 @@ def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Value]:
             # Static typing would refuse `rate:=5` for a floating-point number.
             dynamic_typing=True,
             additional_constraints=(
-                f"one of: {', '.join(parameter.choices)}" if parameter.choices else ""
+                f"one of: {', '.join(parameter.choices)}"
+                if parameter.choices
+                else parameter.pattern
             ),
         )
         low, high = parameter.minimum, parameter.maximum
@@ -183,6 +190,8 @@ def describe(table: Sequence[Parameter]) -> str:
             facts.append(f"default {shown}")
         if parameter.choices:
             facts.append(" | ".join(word for word in parameter.choices if word))
+        if parameter.pattern:
+            facts.append(parameter.pattern)
         if parameter.minimum is not None or parameter.maximum is not None:
             low = "" if parameter.minimum is None else f"{parameter.minimum:g}"
             high = "" if parameter.maximum is None else f"{parameter.maximum:g}"

@@ -444,8 +444,9 @@ class Platform(Entry):
     """Its stamps against the truth."""
     heading_reference: Literal["true", "magnetic"] = "true"
     """What the reported heading counts from."""
-    magnetic_declination_deg: float = 0.0
-    """Magnetic north minus true north, positive to the east."""
+    magnetic_declination_deg: float | None = None
+    """Magnetic north minus true north, positive to the east; unset it counts as nought, and NMEA
+    sentences leave the magnetic direction empty."""
     attitude_noise_deg: NonNegative = 0.5
     """Standard deviation of the reported attitude."""
     velocity_noise: NonNegative = 0.05
