@@ -13,7 +13,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure, Temperature
-from std_msgs.msg import Header, Int64
+from std_msgs.msg import Float32, Float64MultiArray, Header, Int64
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.inputs import EstimatorInputs
@@ -194,6 +194,56 @@ def test_air_and_counts_that_cannot_be_are_left_out_and_counted(tmp_path: Path) 
     }  # fmt: skip
     told = {s.name: s.message for s in inputs.statuses()}
     assert "1 not plausible" in told["topic /t"] and "`scale`" in told["topic /t"]
+
+
+def test_times_of_edges_that_are_no_numbers_are_left_out_and_counted(tmp_path: Path) -> None:
+    source = "{topic: /p, type: std_msgs/msg/Float64MultiArray, field: data, meaning: edges}"
+    station = _station(tmp_path, CUP % source, VANE % "/v")
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: 5)
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    message = Float64MultiArray(data=[1e9, np.inf, np.nan, 2e9, -np.inf, 1e300])
+    receive["/p"](message)
+    assert [time for time, _ in heard.pulses["cup"]] == [1_000_000_000, 2_000_000_000]
+    assert inputs.counts["/p"].not_numbers == 4
+    assert inputs.counts["/p"].unusable == 0
+    data = TopicData("std_msgs/msg/Float64MultiArray", [10**9], [serialize_message(message)])
+    offline = signals_of(BagContent({"/p": data}, typestore()), station, "test", "test")
+    assert offline.pulses["cup"].time.tolist() == [1_000_000_000, 2_000_000_000]
+    assert any("4 times are not numbers" in note for note in offline.notes)
+
+
+@pytest.mark.parametrize(
+    ("meaning", "backwards", "at_rest"),
+    [("frequency", -3.0, -0.01), ("value", -6.0, -0.1)],
+)
+def test_a_cup_that_turns_backwards_is_left_out_and_counted(
+    tmp_path: Path, meaning: str, backwards: float, at_rest: float
+) -> None:
+    source = f"{{topic: /p, type: std_msgs/msg/Float32, meaning: {meaning}}}"
+    station = _station(tmp_path, CUP % source, VANE % "/v")
+    times = iter(range(1, 10))
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: 10**9 * next(times))
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    for value in (5.0, 5.0, backwards, at_rest):
+        receive["/p"](Float32(data=value))
+    assert inputs.counts["/p"].implausible == 1
+    turns = [turned for _, turned in heard.pulses["cup"]]
+    assert 0.0 < turns[1] == turns[2]
+    assert turns[3] == pytest.approx(turns[2], abs=0.01)
+
+
+def test_a_counter_that_begins_anew_is_told(tmp_path: Path) -> None:
+    source = "{topic: /p, type: std_msgs/msg/Int64, meaning: count}"
+    station = _station(tmp_path, CUP % source, VANE % "/v")
+    times = iter(range(1, 10))
+    inputs = EstimatorInputs(station, Collector(), lambda: 10**9 * next(times))
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    for value in (40, 44, 2, 6):
+        receive["/p"](Int64(data=value))
+    told = {s.name: s.values for s in inputs.statuses()}
+    assert told["topic /p"]["restarts of a counter"] == "1"
 
 
 def test_edges_without_a_stamp_are_left_out_and_counted(tmp_path: Path) -> None:

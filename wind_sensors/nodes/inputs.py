@@ -19,6 +19,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.nodes.diagnostics import Level, Status
 from wind_sensors.nodes.platform import ImuWithTwist, odometry_state
 from wind_sensors.station.inputs import (
+    LATEST,
     AirSignal,
     FieldPath,
     TurnCounter,
@@ -53,7 +54,15 @@ class Source(NamedTuple):
 
 @dataclass
 class TopicCount:
-    """What happened to the messages of one topic."""
+    """What happened to the messages of one topic.
+
+    Attributes:
+        received: All of them.
+        without_stamp, not_numbers, implausible, unusable: What was left out, and why.
+        problem: Of the last unusable one.
+        restarts: How often a counter began anew from zero; its turns go on.
+        purposes: What the messages are for.
+    """
 
     received: int = 0
     without_stamp: int = 0
@@ -61,6 +70,7 @@ class TopicCount:
     implausible: int = 0
     unusable: int = 0
     problem: str = ""
+    restarts: int = 0
     purposes: list[str] = field(default_factory=list)
 
 
@@ -176,6 +186,7 @@ class EstimatorInputs:
                     "not numbers": str(count.not_numbers),
                     "not plausible": str(count.implausible),
                     "unusable": str(count.unusable),
+                    "restarts of a counter": str(count.restarts),
                 },
             )
 
@@ -201,7 +212,7 @@ class EstimatorInputs:
             try:
                 for handler in handlers:
                     handler(message, stamp)
-            except (AttributeError, IndexError, TypeError, ValueError) as problem:
+            except (AttributeError, IndexError, OverflowError, TypeError, ValueError) as problem:
                 count.unusable += 1
                 count.problem = str(problem)
 
@@ -230,7 +241,10 @@ class EstimatorInputs:
 
         def edges(message: Any, stamp: int) -> None:
             for time in field_value(message, path):
-                self.estimator.add_pulse(name, int(time))
+                if abs(time) < LATEST:
+                    self.estimator.add_pulse(name, int(time))
+                else:
+                    count.not_numbers += 1
 
         counter = TurnCounter(source, rotor)
 
@@ -241,6 +255,7 @@ class EstimatorInputs:
                 count.not_numbers += 1
             else:
                 count.implausible += reading.jumped
+                count.restarts += reading.restarted
                 self.estimator.add_pulse(name, time, reading.turns)
 
         return {"edge": edge, "edges": edges}.get(source.meaning, turns)

@@ -261,7 +261,7 @@ class MonitorNode(Node):
                 header = getattr(message, "header", None)
                 stamp = 0 if header is None else nanoseconds(header.stamp)
                 self.watch.add_wind(stamp or self._now(), scaled(source, raw))
-            except (AttributeError, IndexError, TypeError, ValueError):
+            except (AttributeError, IndexError, OverflowError, TypeError, ValueError):
                 self._winds_unusable += 1
             self._log()
 

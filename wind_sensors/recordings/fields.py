@@ -20,7 +20,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.store import Typestore
 
 from wind_sensors.errors import UserError
-from wind_sensors.station.inputs import FieldPath
+from wind_sensors.station.inputs import LATEST, FieldPath
 from wind_sensors.station.signals import FloatArray, TimeArray
 
 _CODES = {
@@ -203,9 +203,15 @@ def stamps(
 
 def batches(
     raw: Sequence[bytes], types: Typestore, message_type: str, path: FieldPath
-) -> list[TimeArray]:
-    """An integer array field of every message, e.g. edge times in an Int64MultiArray [ns]."""
+) -> tuple[list[TimeArray], int]:
+    """An array field of times of every message, e.g. edges in an Int64MultiArray [ns].
+
+    Returns:
+        The times, message by message, and how many elements were left out because they are no
+        times: not a number, infinite, or beyond what 64 bits hold.
+    """
     found: list[TimeArray] = []
+    lost = 0
     for data in raw:
         order = _order(data)
         walk = _Walk(types, data, order)
@@ -216,8 +222,12 @@ def batches(
             )
         except (_FieldAbsent, ValueError):
             items = np.empty(0)
+        if items.dtype.kind == "f":
+            times = items[np.abs(items) < LATEST]
+            lost += len(items) - len(times)
+            items = times
         found.append(items.astype(np.int64))
-    return found
+    return found, lost
 
 
 def _order(data: bytes) -> str:

@@ -249,7 +249,9 @@ class _SignalReader:
             return None
         path = field_path(source.field)
         if source.meaning == "edges":
-            found = batches(data.raw, self.content.types, data.message_type, path)
+            found, lost = batches(data.raw, self.content.types, data.message_type, path)
+            if lost:
+                self.notes.append(f"{source.topic}: {lost} times are not numbers and were left out")
             time = np.concatenate([np.empty(0, dtype=np.int64), *found])
             time = time[self._near(source.topic, time)]
             self._note_order(source.topic, time)

@@ -201,12 +201,17 @@ def raw_from_angles(source: Input, angle: FloatArray) -> FloatArray:
     return np.asarray(table[nearest, 0], dtype=np.float64)
 
 
+LATEST = 2.0**63
+"""No time of an edge reaches this [ns]; what is not a number does not lie below it either."""
+
 FASTEST_WIND = 120.0
 """No wind turns a rotor faster [m/s]; the strongest gust that was measured had 113 m/s."""
 _BURST = 1.0
 """Messages without a stamp of their own may come this much closer than they were sent [s]."""
 _BACKWARDS_BURST = 0.2
 """The same for a propeller that turns backwards [s]."""
+_BACKWARDS_NOISE = 0.2
+"""So far below nought may a speed be that a converter reports of a cup at rest [m/s]."""
 _TREMBLE = 1.0
 """A cup that stands may swing back by as much [turns]."""
 
@@ -217,7 +222,8 @@ class TurnReading(NamedTuple):
     Attributes:
         turns: Revolutions since the first message.
         restarted: The source went back and was taken to have restarted from zero.
-        jumped: The source stepped as no wind turns the rotor; the step was left out.
+        jumped: The source stepped or turns as no wind turns the rotor; the turns since the message
+            before were left out.
     """
 
     turns: float
@@ -273,13 +279,13 @@ class TurnCounter:
             turns = self._turn_rate(value) * max(time_ns - self._previous_ns, 0) * 1e-9
         else:
             turns = 0.0
-        jumped = not self._is_possible(turns, time_ns)
+        jumped = not self._is_possible(turns, time_ns, value)
         if not jumped:
             self._turns += turns
         self._previous, self._previous_ns = value, time_ns
         return TurnReading(float(self._turns), restarted and not jumped, jumped)
 
-    def _is_possible(self, turns: float, time_ns: int) -> bool:
+    def _is_possible(self, turns: float, time_ns: int, value: float) -> bool:
         """Whether some wind turns the rotor so far between the message before and this one."""
         seconds = (time_ns - self._previous_ns) * 1e-9
         if self._previous is None or seconds < 0.0:
@@ -287,12 +293,21 @@ class TurnCounter:
             return True
         fastest = FASTEST_WIND / (2.0 * np.pi * self._rotor.calibration_distance)
         if self._source.meaning not in {"count", "angle"}:
-            return bool(abs(turns) <= fastest * seconds)
+            return bool(abs(turns) <= fastest * seconds) and not self._turns_backwards(value)
         if turns >= 0.0:
             return bool(turns <= fastest * (seconds + _BURST) + _TREMBLE)
         if isinstance(self._rotor, Cup) and self._source.meaning == "count":
             return seconds == 0.0 or bool(-turns <= _TREMBLE)
         return bool(-turns <= fastest * (seconds + _BACKWARDS_BURST) + _TREMBLE)
+
+    def _turns_backwards(self, value: float) -> bool:
+        """Whether a frequency or an indicated speed is one of a cup that runs in reverse."""
+        if isinstance(self._rotor, Propeller):
+            return False
+        speed = value
+        if self._source.meaning == "frequency":
+            speed = 2.0 * np.pi * self._rotor.calibration_distance * self._turn_rate(value)
+        return bool(speed < -_BACKWARDS_NOISE)
 
     def _turn_rate(self, value: float) -> float:
         if self._source.meaning == "frequency":
