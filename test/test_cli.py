@@ -311,6 +311,24 @@ def test_compose_names_the_option(
     assert told in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("record --all -o new --duration nan", "--duration: give a positive number, not 'nan'"),
+        ("record --all -o new --duration -5", "--duration: give a positive number, not '-5'"),
+        ("replay nowhere --rate inf", "--rate: give a positive number, not 'inf'"),
+        ("replay nowhere --rate 0", "--rate: give a positive number, not '0'"),
+        ("replay nowhere --wait-for -3", "--wait-for: give a whole number from 0, not '-3'"),
+    ],
+)
+def test_numbers_that_mean_nothing_are_refused(
+    capsys: pytest.CaptureFixture[str], arguments: str, told: str
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments.split())
+    assert told in capsys.readouterr().err
+
+
 def test_info_shows_topics_rates_station_and_notes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,6 +7,8 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -62,6 +64,22 @@ def _wind(domain: int, tmp_path: Path, *arguments: str) -> subprocess.Popen[str]
         stderr=subprocess.STDOUT,
         text=True,
     )
+
+
+def _readable(bag: Path) -> int:
+    """Messages that are in a bag by now."""
+    try:
+        return sum(len(topic.raw) for topic in read_bag(bag).topics.values())
+    except UserError:
+        return 0
+
+
+def _wait(until: Callable[[], bool], at_most: float = 180.0) -> None:
+    """Leave the machine to other processes until the condition holds."""
+    end = time.monotonic() + at_most
+    while not until():
+        assert time.monotonic() < end, "what the test waits for never happened"
+        time.sleep(0.1)
 
 
 def _assert_same_signals(first: Recording, second: Recording) -> None:
@@ -142,6 +160,65 @@ def test_compose_runs_a_station_to_its_end(graph: Graph, tmp_path: Path) -> None
     assert len(content.topics["/wind/mean"].raw) == 1
 
 
+def test_a_composition_that_is_interrupted_publishes_the_window_under_way(
+    graph: Graph, tmp_path: Path
+) -> None:
+    target = tmp_path / "interrupted"
+    composing = _wind(
+        graph.domain, tmp_path, "compose", "mast_cup_vane", "--rate", "20", "-o", str(target)
+    )
+    _wait(lambda: composing.poll() is not None or _readable(target / "bag") > 0)
+    composing.send_signal(signal.SIGINT)
+    composing.send_signal(signal.SIGINT)
+    output, _ = composing.communicate(timeout=20)
+    assert composing.returncode == 0, output
+    content = read_bag(target / "bag")
+    assert len(content.topics["/wind/mean"].raw) == 1
+    wind = content.topics["/wind"]
+    message: Any = content.types.deserialize_cdr(wind.raw[-1], wind.message_type)
+    last = message.header.stamp
+    heard = read_recording(target).angles["vane"].time[-1]
+    assert heard - (last.sec * 10**9 + last.nanosec) < 500_000_000
+
+
+_STOPPED_AT_AN_IMPORT = """
+import os, signal, sys
+
+class Stopping:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            os.kill(os.getpid(), int(sys.argv[2]))
+
+sys.meta_path.insert(0, Stopping())
+from wind_sensors.cli.main import main
+sys.exit(main(sys.argv[3:]) or "the signal was lost")
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "number", "arguments"),
+    [
+        ("rich.console", signal.SIGINT, ["record", "--all", "-o", "out"]),
+        ("rosbags.rosbag2", signal.SIGTERM, ["replay", "."]),
+        ("rclpy", signal.SIGINT, ["compose", "mast_cup_vane"]),
+    ],
+)
+def test_a_command_that_is_stopped_while_it_loads_ends_with_status_zero(
+    module: str, number: signal.Signals, arguments: list[str], tmp_path: Path
+) -> None:
+    stopped = subprocess.run(
+        [sys.executable, "-c", _STOPPED_AT_AN_IMPORT, module, str(int(number)), *arguments],
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parent.parent)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert stopped.returncode == 0, stopped.stderr
+    assert "Traceback" not in stopped.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -161,14 +238,6 @@ def test_mistakes_end_with_status_two(
     assert "Traceback" not in output
 
 
-def _readable(bag: Path) -> int:
-    """Messages that are in a bag by now."""
-    try:
-        return sum(len(topic.raw) for topic in read_bag(bag).topics.values())
-    except UserError:
-        return 0
-
-
 def test_a_killed_recorder_leaves_what_it_had_recorded(
     graph: Graph, tmp_path: Path, original: Path
 ) -> None:
@@ -185,11 +254,7 @@ def test_a_killed_recorder_leaves_what_it_had_recorded(
         wait_for_subscribers=1,
     )
     graph.spin(lambda: player.finished, at_most=40.0)
-    graph.spin(
-        lambda: _readable(target / "bag") == player.published,
-        at_most=20.0,
-        so_far=lambda: f"{_readable(target / 'bag')} of {player.published}",
-    )
+    _wait(lambda: _readable(target / "bag") == player.published)
     assert not (target / "bag" / "metadata.yaml").exists()
     recording.kill()
     recording.communicate(timeout=20)

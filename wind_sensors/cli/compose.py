@@ -22,7 +22,8 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
         "compose",
         help="simulator, estimators and recorder of a station in one process",
         description="Run the simulated signals of a station, the estimator that fits its "
-        "instruments and, with -o, a recorder in one process, until Ctrl-C or --duration. Every "
+        "instruments and, with -o, a recorder in one process, until Ctrl-C or --duration; the "
+        "averaging window that is under way then is published as far as it has come. Every "
         "further parameter of the nodes: --ros-args -p sim_node:NAME:=VALUE (or -p "
         "cup_vane_node:NAME:=VALUE).",
     )
@@ -94,7 +95,10 @@ def run(args: argparse.Namespace) -> int:
             )
             return made[0].has_ended()
 
-        execution.run(build, ros_arguments(args), until=until)
+        def wind_up() -> bool:
+            return made[0].wind_up()
+
+        execution.run(build, ros_arguments(args), until=until, wind_up=wind_up)
     if made and made[0].recorder is not None:
         show(made[0].recorder, args.output, console)
     return 0

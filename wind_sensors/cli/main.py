@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -31,6 +31,9 @@ COMMANDS: dict[str, str] = {
 }
 """Every command with its one-line description; a module that is not installed is not listed."""
 
+_LIVE = frozenset({"record", "replay", "compose"})
+"""Commands that a stop signal ends as it ends a node: with status 0, at any moment."""
+
 
 def module_of(command: str) -> str:
     """Name of the module behind a command."""
@@ -51,15 +54,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     commands = {name: text for name, text in COMMANDS.items() if find_spec(module_of(name))}
     chosen = given[0] if given and given[0] in commands else None
-    parser = _parser(commands, chosen)
-    if not given:
-        parser.print_help()
-        return 0
-    options = parser.parse_args(given)
+    if chosen in _LIVE:
+        from wind_sensors.nodes.execution import stop_signals_answered
+
+        with stop_signals_answered():
+            return _run(commands, chosen, given)
+    return _run(commands, chosen, given)
+
+
+def _run(commands: Mapping[str, str], chosen: str | None, given: Sequence[str]) -> int:
     try:
+        parser = _parser(commands, chosen)
+        if not given:
+            parser.print_help()
+            return 0
+        options = parser.parse_args(given)
         return int(options.run(options))
     except UserError as problem:
-        print(f"wind {options.command}: {problem}", file=sys.stderr)
+        print(f"wind {chosen}: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
@@ -68,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
 
 
-def _parser(commands: dict[str, str], chosen: str | None) -> argparse.ArgumentParser:
+def _parser(commands: Mapping[str, str], chosen: str | None) -> argparse.ArgumentParser:
     """The parser; only the chosen command's module is imported, so that help is instant."""
     parser = argparse.ArgumentParser(
         prog="wind",

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from wind_sensors.cli.numbers import positive
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
 
 if TYPE_CHECKING:
@@ -26,14 +27,16 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
         help="record live topics into a recording",
         description="Record live topics until Ctrl-C or --duration. With --station the folder "
         "becomes a RECORDING that every other command reads; its inputs and the corrected wind "
-        "are recorded. Messages are stored as they were sent.",
+        "are recorded. Messages are stored as they were sent, latched (transient local) ones too. "
+        "What has come is written every second and kept on the disk every five, so that a recorder "
+        "that is killed leaves a recording that every command reads.",
     )
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="folder to write")
     parser.add_argument("--station", metavar="FILE", help="station file of the instruments")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--topics", nargs="+", metavar="TOPIC", help="record these topics")
     which.add_argument("--all", action="store_true", help="record every topic but /clock")
-    parser.add_argument("--duration", type=float, metavar="S", help="stop after S seconds")
+    parser.add_argument("--duration", type=positive, metavar="S", help="stop after S seconds")
     parser.add_argument(
         "--use-sim-time", action="store_true", help="times of recording from /clock"
     )

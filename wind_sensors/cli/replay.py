@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from wind_sensors.cli.numbers import count, positive
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
         "/clock, so that nodes with use_sim_time see the time of the recording.",
     )
     parser.add_argument("recording", metavar="RECORDING", help="recording folder, or a bag")
-    parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="X times as fast")
+    parser.add_argument("--rate", type=positive, default=1.0, metavar="X", help="X times as fast")
     parser.add_argument("--loop", action="store_true", help="start again at the end")
     parser.add_argument("--topics", nargs="+", metavar="TOPIC", help="these topics alone")
     parser.add_argument(
@@ -37,7 +38,7 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument(
         "--wait-for",
-        type=int,
+        type=count,
         default=0,
         metavar="N",
         help="begin when each topic has N subscribers",
@@ -53,8 +54,6 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.recordings.bag import read_bag
     from wind_sensors.recordings.reading import BAG_FOLDER
 
-    if args.rate <= 0.0:
-        raise UserError(f"--rate is {args.rate:g}.", remedy="Give a positive number.")
     folder = Path(args.recording)
     if not folder.exists():
         raise UserError("there is no such recording.", str(folder), "Check the path.")

@@ -22,6 +22,9 @@ _SETTLING = 0.5
 _PATIENCE = 5.0
 """The same while the estimator has not received all that was sent."""
 
+_SHORT_PATIENCE = 1.5
+"""The same after a stop signal."""
+
 
 class Composition:
     """The nodes of `wind compose`.
@@ -81,11 +84,19 @@ class Composition:
         found: list[Node] = [self.simulator, self.estimator]
         return found if self.recorder is None else [*found, self.recorder]
 
+    def wind_up(self) -> bool:
+        """End the simulation; whether the last results are out. To be asked as `has_ended` is."""
+        self.simulator.stop()
+        return self._has_ended(_SHORT_PATIENCE)
+
     def has_ended(self) -> bool:
         """Whether the simulation has ended and the last results are out.
 
         To be asked repeatedly while the nodes spin: it makes the estimator finish.
         """
+        return self._has_ended(_PATIENCE)
+
+    def _has_ended(self, patience: float) -> bool:
         if not self.simulator.finished:
             return False
         now = time.monotonic()
@@ -94,7 +105,7 @@ class Composition:
         silence = now - max(self._finished_at, self.estimator.received_at)
         topics = self.estimator.topics
         sent = sum(n for t, n in self.simulator.published_by_topic().items() if t in topics)
-        if silence < (_SETTLING if self.estimator.received >= sent else _PATIENCE):
+        if silence < (_SETTLING if self.estimator.received >= sent else patience):
             return False
         if not self._flushed:
             self._flushed = True

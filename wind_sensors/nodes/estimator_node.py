@@ -198,8 +198,8 @@ class EstimatorNode(Node):
         if estimates:
             self._last_estimate = estimates[-1]
             self._outputs.publish_estimates(estimates)
-            for window in self._estimator.take_windows():
-                self._outputs.publish_window(window)
+        for window in self._estimator.take_windows():
+            self._outputs.publish_window(window)
 
     def _ask_for_mounting(self) -> None:
         """Use the sensor's pose as soon as tf2 tells it."""

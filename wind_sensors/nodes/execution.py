@@ -9,7 +9,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from enum import Enum, auto
 from importlib import import_module
 from types import FrameType, TracebackType
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 _WAKE_UP_PERIOD = 0.5
+_WINDING_UP = 4.0
+"""After a stop signal [s]; launchers send a harder one after five."""
 
 
 class _Stopped(BaseException):
@@ -101,6 +105,11 @@ class _StopSignals:
         self._installed = False
         self.phase = _Phase.LOADING
 
+    def hand_back(self) -> None:
+        """Leave SIGINT and SIGTERM to Python, unless a run has handed them on already."""
+        if self._installed:
+            self.uninstall(ignore=False)
+
     def _answer(self, number: int, frame: FrameType | None) -> None:
         if self.phase is _Phase.LOADING:
             # Nothing has been opened yet, so there is nothing to close.
@@ -111,6 +120,20 @@ class _StopSignals:
 
 
 _stop_signals = _StopSignals()
+
+
+@contextmanager
+def stop_signals_answered() -> Iterator[None]:
+    """End with status 0 at SIGINT and SIGTERM from here on, while libraries load and after it.
+
+    For a command that calls `run` inside; to be entered from the main thread, before anything is
+    open that must be closed.
+    """
+    _stop_signals.install()
+    try:
+        yield
+    finally:
+        _stop_signals.hand_back()
 
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
@@ -156,6 +179,7 @@ def run(
     arguments: Sequence[str] | None = None,
     *,
     until: Callable[[], bool] | None = None,
+    wind_up: Callable[[], bool] | None = None,
     last: bool = True,
 ) -> int:
     """Initialise rclpy, build nodes, spin them in one executor, and clean up.
@@ -167,6 +191,8 @@ def run(
         build: Makes the nodes; called after `rclpy.init`.
         arguments: Command line that may hold `--ros-args`.
         until: Asked after each batch of callbacks, at least twice a second; True ends the run.
+        wind_up: Asked in the same way after a stop signal that finds the nodes spinning: they
+            spin on until it is True, four seconds at the most. None: a signal ends the run.
         last: The process ends after this, so further stop signals are ignored.
 
     Returns:
@@ -199,6 +225,11 @@ def run(
         _stop_signals.phase = _Phase.RUNNING
         while rclpy.ok() and not _stop_signals.stopped and not (until is not None and until()):
             # A signal that finds nothing to do is answered when this returns.
+            executor.spin_once(timeout_sec=_WAKE_UP_PERIOD)
+        end = time.monotonic() + _WINDING_UP
+        while _stop_signals.stopped and wind_up is not None and rclpy.ok():
+            if wind_up() or time.monotonic() >= end:
+                break
             executor.spin_once(timeout_sec=_WAKE_UP_PERIOD)
     except (_Stopped, KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -122,7 +122,7 @@ class SimulatorNode(Node):
         options: Further arguments of rclpy's Node.
 
     Attributes:
-        finished: `duration` has passed and everything has been published.
+        finished: `duration` has passed and everything has been published, or it was stopped.
 
     Raises:
         UserError: The station or a parameter is wrong.
@@ -175,6 +175,10 @@ class SimulatorNode(Node):
             _TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self._updater = Updater(self, [self._status], period=number(values["diagnostics_period"]))
+
+    def stop(self) -> None:
+        """Publish nothing more, as at the end of `duration`."""
+        self.finished = True
 
     @property
     def elapsed(self) -> float:
