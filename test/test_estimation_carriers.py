@@ -15,7 +15,9 @@ CHANGING: dict[str, Case] = {
     "vane offset": Case(changes=(change("vane", offset_deg=15.0),), turn=4.0),
     "latency": Case(changes=(change("vane", stop=None, clock={"latency": 1.0}),), rms=1.5),
     "low pass": Case(changes=(change("vane", stop=None, filter_time_constant=1.0),), rms=1.3),
-    "dead time": Case(changes=(change("cup", electronics={"dead_time": 0.03}),)),
+    "dead time": Case(
+        changes=(change("cup", electronics={"dead_time": 0.03}),), speed=0.2, found_out=True
+    ),
     "speed of the boat": Case(
         changes=(change("platform", velocity_scale=1.5),), platform={}, scenario=SAILING, turn=1.0
     ),

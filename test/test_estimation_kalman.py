@@ -140,3 +140,16 @@ def test_a_longer_lag_helps_until_the_instruments_have_forgotten() -> None:
         errors.append(np.sqrt(np.mean(error**2)))
     assert errors[0] > 1.05 * errors[1]
     assert errors[2] < 1.06 * errors[1]
+
+
+def test_slot_errors_are_learnt_without_being_told() -> None:
+    planted = np.array([0.12, -0.08, 0.05, -0.09])
+    recording = blown(mast({"electronics": {"slot_errors": list(planted)}}), duration=120.0)
+    estimator = make_estimator(mast(), EstimatorSettings(window=100.0))
+    feed(estimator, messages(recording))
+    core = estimator._core
+    assert isinstance(core, KalmanCore)
+    learnt = core.filter.slot_error[0, :4]
+    # The filter does not know which slot came first.
+    turned = [np.roll(planted - planted.mean(), k) for k in range(4)]
+    assert min(np.abs(learnt - t).max() for t in turned) < 0.02
