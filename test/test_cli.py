@@ -16,7 +16,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from wind_sensors.cli import main as front
 from wind_sensors.cli import monte_carlo
 from wind_sensors.cli.main import main
-from wind_sensors.recordings import write_recording
+from wind_sensors.errors import UserError
+from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.writing import keep_inputs
 from wind_sensors.report import plots
 from wind_sensors.station.model import Air, Cup, Input, Propeller, Reference, Station, Vane
@@ -133,10 +134,19 @@ def test_force_never_removes_what_is_read(
     assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
 
 
-def test_a_result_may_replace_what_is_not_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["steady_wind", "nested/wind", "ste"])
+def test_a_result_may_replace_what_is_not_read(tmp_path: Path, name: str) -> None:
     folder = write_recording(tmp_path / "steady", steady_recording(seconds=5.0))
-    for path in (tmp_path / "steady_wind", tmp_path / "nested" / "wind", tmp_path / "ste"):
-        keep_inputs(path, (folder, folder / "bag", "mast_cup_vane", None))
+    read = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    inputs = (folder, folder / "bag", "mast_cup_vane", None)
+    keep_inputs(tmp_path / name, inputs)
+    with pytest.raises(UserError, match="Name another folder"):
+        keep_inputs(folder / name, inputs)
+    earlier = write_recording(tmp_path / name, steady_recording(seconds=3.0))
+    replaced = read_recording(earlier).stop
+    assert main(["process", str(folder), "-o", str(earlier), "--force"]) == 0
+    assert read_recording(earlier).stop == read_recording(folder).stop > replaced
+    assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == read
 
 
 OWN_TYPE = "lake_msgs/msg/Level"

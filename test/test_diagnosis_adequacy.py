@@ -171,6 +171,9 @@ def test_the_form_of_no_change_is_no_signature() -> None:
     simulated = comparison.simulate(STATION)
     trust = trust_of(comparison, simulated, baseline())
     assert form_signatures(comparison, trust, simulated, simulated).shape[0] == 0
+    turned = with_effect(STATION, catalogue()["vane_offset"], "vane", {"offset": 8.0})
+    changed = comparison.simulate(turned)
+    assert form_signatures(comparison, trust, simulated, changed).shape[0] > 0
 
 
 def test_a_rotor_that_runs_away_is_refused_at_once() -> None:

@@ -309,11 +309,13 @@ def test_a_part_that_explains_less_than_the_whole_only_hides_where_eddies_are_mi
     monkeypatch: pytest.MonkeyPatch, planted: Interval
 ) -> None:
     searcher, null = searched("vane_friction", "vane", {"friction_speed": 2.0}, planted)
-    monkeypatch.setattr(rounds, "calms_too_much", lambda *_: True)
+    if planted == ALWAYS:
+        # Nothing is missed in the eddies of a vane that always sticks; say that it were.
+        monkeypatch.setattr(rounds, "calms_too_much", lambda *_: True)
     sticks = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
     always = judged(searcher, [fit(null, STATION, [sticks], searcher.bank.without)])
     parts = rounds._where_they_calm(searcher, no_terms(null, searcher), always, None)
-    assert bool(parts) is (planted != ALWAYS)
+    assert [part.fit.terms[-1].interval for part in parts] == [planted] * (planted != ALWAYS)
 
 
 @pytest.mark.parametrize("bursts", [True, False])

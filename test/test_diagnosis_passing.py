@@ -190,24 +190,39 @@ def test_a_vane_that_sticks_from_some_moment_on_does_so_in_that_part_of_the_reco
 
 
 @pytest.mark.parametrize(
-    ("effect", "values", "gained", "too_much"),
+    ("planted", "effect", "values", "too_much"),
     [
-        ("vane_friction", {"friction_speed": 0.6}, -12.0, True),
-        ("vane_friction", {"friction_speed": 0.6}, -8.0, False),
-        ("timestamp_latency", {"latency": 0.5}, -12.0, False),
-        ("vane_offset", {"offset": 2.0}, -12.0, False),
+        (False, "vane_friction", {"friction_speed": 1.3}, True),
+        (False, "vane_inertia", {"inertia_factor": 3.0}, True),
+        # So little takes away less than chance does; an offset takes nothing.
+        (False, "vane_friction", {"friction_speed": 0.6}, False),
+        (False, "vane_offset", {"offset": 20.0}, False),
+        (True, "vane_friction", {"friction_speed": 1.3}, False),
+        (True, "vane_inertia", {"inertia_factor": 3.0}, False),
     ],
 )
 def test_what_takes_eddies_away_that_the_signals_have_calms_too_much(
-    monkeypatch: pytest.MonkeyPatch, searcher: Searcher, effect: str, values: dict[str, float],
-    gained: float, too_much: bool,
-) -> None:  # fmt: skip
+    planted: bool, effect: str, values: dict[str, float], too_much: bool
+) -> None:
+    station = with_effect(STATION, catalogue()[effect], "vane", values) if planted else STATION
+    recording = replace(recorded(station, 71), station=STATION)
+    searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
     null = searcher.whitener(searcher.bank.without)
     term = Term(catalogue()[effect], "vane", values)
     found = fit(null, STATION, [term], searcher.bank.without, iterations=0)
-    monkeypatch.setattr(acceptance, "gained_by_eddies", lambda *_: gained)
     (one,) = judged(searcher, [found])
     assert calms_too_much(searcher, one, no_terms(null, searcher)) is too_much
+
+
+def test_a_delay_is_not_asked_what_becomes_of_eddies(
+    monkeypatch: pytest.MonkeyPatch, searcher: Searcher
+) -> None:
+    null = searcher.whitener(searcher.bank.without)
+    late = Term(catalogue()["timestamp_latency"], "vane", {"latency": 0.5})
+    found = fit(null, STATION, [late], searcher.bank.without, iterations=0)
+    monkeypatch.setattr(acceptance, "gained_by_eddies", lambda *_: -1000.0)
+    (one,) = judged(searcher, [found])
+    assert not calms_too_much(searcher, one, no_terms(null, searcher))
 
 
 def test_a_grease_tells_nothing_of_its_stiffening_within_minutes_at_one_temperature() -> None:

@@ -182,6 +182,7 @@ def test_friction_keeps_its_name_beside_them() -> None:
 
 
 def test_suspects_bear_no_name_of_the_catalogue_but_can_be_mistaken_for_some() -> None:
+    assert SUSPECTS
     for fault in SUSPECTS:
         assert fault.name not in catalogue()
         assert fault.confusable

@@ -40,7 +40,9 @@ def _set(node: Any, **changes: Any) -> Any:
 
 def test_whole_numbers_are_welcome_where_a_fraction_is_meant(graph: Graph) -> None:
     node = _estimator(graph, output_rate=5)
+    assert node.get_parameter("output_rate").value == 5.0
     assert _set(node, smoother_lag=2).successful
+    assert node.get_parameter("smoother_lag").value == 2.0
 
 
 def test_changes_at_run_time_take_effect_or_say_why_not(graph: Graph) -> None:

@@ -223,10 +223,13 @@ def test_the_same_spec_gives_the_same_recording_to_the_last_byte(
     first = generate_recording(spec.into(tmp_path / "one"))
     second = generate_recording(spec.into(tmp_path / "two"))
     assert first == second
-    for name in ("recording.yaml", "bag/bag.mcap"):
-        one, two = (tmp_path / "one" / name), (tmp_path / "two" / name)
-        if two.exists():
-            assert one.read_bytes() == two.read_bytes()
+    one, two = (
+        {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+        for folder in (tmp_path / "one", tmp_path / "two")
+    )
+    assert one == two
+    assert {"recording.yaml", "metadata.yaml"} <= {path.name for path in one}
+    assert any(path.suffix == ".mcap" and len(content) > 100_000 for path, content in one.items())
     assert first[0]["effect"] == "wake_shadow"
     assert "wake" not in (tmp_path / "one" / "recording.yaml").read_text()
 
