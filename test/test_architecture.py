@@ -30,7 +30,7 @@ STEPS = (
     ("verdict",),
     ("json_output",),
     ("outcome",),
-    ("counts", "means", "watch"),
+    ("means", "watch"),
     ("latent",),
 )
 """Parts of the diagnosis from the bottom to the top; those on one level do not know each other."""
