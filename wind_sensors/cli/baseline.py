@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -15,8 +15,10 @@ from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import complete, default_baseline, learn
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import check_writable, refused_in_words
-from wind_sensors.recordings.reading import read_recording
+from wind_sensors.recordings.reading import home_of, read_recording
 from wind_sensors.station.model import Station
+from wind_sensors.station.sameness import first_difference
+from wind_sensors.station.signals import Recording
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,19 +41,78 @@ def workers() -> int:
     return min(2, os.cpu_count() or 1)
 
 
+def read_healthy(
+    healthy: Sequence[str],
+    station_file: str | None,
+    diagnosed: str | None = None,
+    station: Station | None = None,
+    advance: Callable[[], None] = lambda: None,
+) -> list[Recording]:
+    """Healthy recordings of one station, each once.
+
+    Args:
+        healthy: Folders or bags.
+        station_file: Station file that replaces their own.
+        diagnosed: The recording that they are to judge, if there is one.
+        station: Its station; None: that of the first of them.
+        advance: Called after each.
+
+    Raises:
+        UserError: One cannot be read, is named twice, is the diagnosed one, or is of another
+            station.
+    """
+    places: dict[Path, str] = {}
+    if diagnosed is not None:
+        places[home_of(Path(diagnosed)).resolve()] = "it is the recording that is to be judged"
+    found: list[Recording] = []
+    for path in healthy:
+        place = home_of(Path(path)).resolve()
+        if place in places:
+            raise UserError(
+                f"this cannot be a healthy recording: {places[place]}.",
+                path,
+                "Name recordings of the same station while nothing was wrong, each once.",
+            )
+        places[place] = "it is named twice"
+        found.append(read_recording(path, station_file))
+        if station is None:
+            station = found[0].station
+        _refuse_another(station, found[-1].station, path)
+        advance()
+    return found
+
+
+def _refuse_another(station: Station, healthy: Station, where: str) -> None:
+    difference = first_difference(station, healthy)
+    if difference:
+        raise UserError(
+            f"this is not the station that is to be judged: {difference}.",
+            where,
+            "Name healthy recordings of the same station; if it is the same, make its station "
+            "files agree.",
+        )
+
+
 def learnt(
-    healthy: Sequence[str], station_file: str | None, station: Station | None, progress: Progress
+    healthy: Sequence[str],
+    station_file: str | None,
+    progress: Progress,
+    diagnosed: str | None = None,
+    station: Station | None = None,
 ) -> Baseline:
     """A baseline from healthy recordings, or from tolerances when there are none.
 
+    Args:
+        healthy, station_file, diagnosed, station: As in `read_healthy`.
+        progress: Shows how far it is.
+
     Raises:
-        UserError: A recording cannot be read, or there is neither a recording nor a station.
+        UserError: As in `read_healthy`, or there is neither a recording nor a station.
     """
-    recordings = []
     task = progress.add_task("reading healthy recordings", total=max(len(healthy), 1))
-    for path in healthy:
-        recordings.append(read_recording(path, station_file))
-        progress.advance(task)
+    recordings = read_healthy(
+        healthy, station_file, diagnosed, station, lambda: progress.advance(task)
+    )
     if not recordings:
         if station is None:
             raise UserError("no healthy recording is named.", "", "Name at least one.")
@@ -71,14 +132,14 @@ def learnt(
     )
 
 
-def read_baseline(path: Path) -> Baseline:
+def read_baseline(path: Path, station: Station) -> Baseline:
     """A baseline from its file.
 
     Raises:
-        UserError: The file is absent or something else.
+        UserError: The file is absent or something else, or of another station.
     """
     try:
-        return Baseline.from_json(path.read_text(encoding="utf-8"))
+        baseline = Baseline.from_json(path.read_text(encoding="utf-8"))
     except OSError as problem:
         raise UserError(
             f"the baseline cannot be read ({problem.strerror}).",
@@ -91,6 +152,8 @@ def read_baseline(path: Path) -> Baseline:
             str(path),
             "Make one with `wind baseline HEALTHY... -o FILE`.",
         ) from None
+    _refuse_another(station, baseline.original, str(path))
+    return baseline
 
 
 def run(options: argparse.Namespace) -> int:
@@ -105,7 +168,7 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("this is a folder.", str(options.output), "Name a file with -o.")
     check_writable(options.output.parent)
     with Progress(console=Console(stderr=True), transient=True) as progress:
-        baseline = learnt(options.recordings, options.station, None, progress)
+        baseline = learnt(options.recordings, options.station, progress)
     with refused_in_words(options.output, "baseline"):
         options.output.parent.mkdir(parents=True, exist_ok=True)
         options.output.write_text(baseline.to_json() + "\n", encoding="utf-8")

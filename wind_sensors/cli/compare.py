@@ -55,9 +55,11 @@ def run(options: argparse.Namespace) -> int:
     with Progress(console=Console(stderr=True), transient=True) as progress:
         recording = read_recording(options.recording, options.station)
         if options.baseline is not None:
-            baseline = read_baseline(options.baseline)
+            baseline = read_baseline(options.baseline, recording.station)
         else:
-            baseline = learnt(options.healthy, options.station, recording.station, progress)
+            baseline = learnt(
+                options.healthy, options.station, progress, options.recording, recording.station
+            )
         task = progress.add_task("comparing", total=1.0)
         baseline = baseline.for_station(recording.station)
         comparison = prepare(recording, baseline.station, baseline.place)

@@ -63,9 +63,11 @@ def run(options: argparse.Namespace) -> int:
         if other_reference(recording):
             return diagnose_otherwise(options, recording, progress)
         if options.baseline is not None:
-            baseline = read_baseline(options.baseline)
+            baseline = read_baseline(options.baseline, recording.station)
         else:
-            baseline = learnt(options.healthy, options.station, recording.station, progress)
+            baseline = learnt(
+                options.healthy, options.station, progress, options.recording, recording.station
+            )
         tasks: dict[str, TaskID] = {}
 
         def report(phase: str, share: float) -> None:

@@ -9,13 +9,14 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
+from wind_sensors.cli.baseline import read_healthy
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
 from wind_sensors.diagnosis.means.healthy import learn_means
 from wind_sensors.diagnosis.outcome import Outcome, with_silent
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import refused_in_words
-from wind_sensors.recordings.reading import read_recording, read_series
+from wind_sensors.recordings.reading import read_series
 from wind_sensors.report.outcome_files import write_outcome
 from wind_sensors.station.model import Rotor
 from wind_sensors.station.signals import Recording, Series
@@ -92,10 +93,12 @@ def _reporter(progress: Progress) -> Callable[[str, float], None]:
 def _of_means(
     options: argparse.Namespace, recording: Recording, report: Callable[[str, float], None]
 ) -> Outcome:
-    healthy = []
-    for path in options.healthy:
-        one = read_recording(path, options.station)
-        healthy.append((one, deviations_of(path, one)))
+    known = read_healthy(
+        options.healthy, options.station, options.recording, recording.station
+    )
+    healthy = [
+        (one, deviations_of(path, one)) for path, one in zip(options.healthy, known, strict=True)
+    ]
     deviations = deviations_of(options.recording, recording)
     return diagnose_means(recording, deviations, learn_means(healthy), report)
 
