@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
+from wind_sensors.cli.info import duration
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.importing import import_files, write_imported
 from wind_sensors.recordings.mapping import MappingFile, read_mapping
@@ -54,8 +55,9 @@ def run(options: argparse.Namespace) -> int:
         target = write_imported(options.output, imported, mapping_file, force=options.force)
         progress.advance(task)
     for topic in imported.topics:
-        span = (int(topic.time[-1]) - int(topic.time[0])) * 1e-9
-        print(f"  {topic.topic}: {len(topic.raw)} messages over {span:.1f} s")
+        span = duration((int(topic.time[-1]) - int(topic.time[0])) * 1e-9)
+        messages = "1 message" if len(topic.raw) == 1 else f"{len(topic.raw)} messages"
+        print(f"  {topic.topic}: {messages} over {span}")
     for what, count in imported.faults.most_common():
         print(f"  left out: {count} {what}")
     for note in imported.notes:

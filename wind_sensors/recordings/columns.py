@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import datetime
 import gzip
+import json
+import math
 import re
-import zoneinfo
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +16,29 @@ from pathlib import Path
 import numpy as np
 
 from wind_sensors.errors import UserError
-from wind_sensors.recordings.mapping import Mapping, TimeColumn
+from wind_sensors.recordings.local_time import EPOCH, to_utc
+from wind_sensors.recordings.mapping import Mapping
 from wind_sensors.station.signals import FloatArray, TimeArray
 
 _GZIP = b"\x1f\x8b"
 _TOA5_HEADER = 4
-_MINUTE = 60_000_000_000
-_EPOCH = datetime.datetime(1970, 1, 1)
+
+USUAL_FORMATS = (
+    "%d.%m.%Y %H:%M",
+    "%d.%m.%Y %H:%M:%S",
+    "%d.%m.%Y %H:%M:%S.%f",
+    "%d.%m.%y %H:%M",
+    "%d.%m.%y %H:%M:%S",
+    "%d/%m/%Y %H:%M",
+    "%d/%m/%Y %H:%M:%S",
+    "%m/%d/%Y %H:%M",
+    "%m/%d/%Y %H:%M:%S",
+    "%Y/%m/%d %H:%M",
+    "%Y/%m/%d %H:%M:%S",
+    "%Y%m%d%H%M",
+    "%Y%m%d%H%M%S",
+)
+"""Times as tables have them, for advice."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +49,13 @@ class Table:
         time: Stamps as the file has them, in UTC [ns], shape (n,).
         values: Columns by name, NaN where the cell is missing; shape (n,) each.
         faults: What was wrong, with the number of lines.
+        notes: Where and what it was at first, and how to mend it.
     """
 
     time: TimeArray
     values: dict[str, FloatArray]
     faults: Counter[str]
+    notes: tuple[str, ...]
 
 
 def read_text(path: Path) -> str:
@@ -50,7 +70,8 @@ def read_text(path: Path) -> str:
             data = gzip.decompress(data)
     except (OSError, EOFError) as problem:
         raise UserError(f"the file cannot be read ({problem}).", str(path)) from None
-    return data.decode("utf-8-sig", errors="replace")
+    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data.decode("utf-16" if wide else "utf-8-sig", errors="replace")
 
 
 def read_table(path: Path, mapping: Mapping) -> Table:
@@ -73,25 +94,70 @@ def read_table(path: Path, mapping: Mapping) -> Table:
             raise UserError(
                 f"the table has no column '{column}'.",
                 f"{path}:{header + 1}",
-                f"Columns: {', '.join(names)}.",
+                f"Columns: {', '.join(names)}.{_other_delimiter(names, column)}",
             )
     places = [names.index(column) for column in wanted]
     time_place = names.index(mapping.time.column)
     faults: Counter[str] = Counter()
+    notes: list[str] = []
     rows: list[list[str]] = []
-    for row in csv.reader(lines[first:], delimiter=delimiter):
+    numbers: list[int] = []
+    reader = csv.reader(lines[first:], delimiter=delimiter)
+    for row in reader:
         if len(row) == len(names):
             rows.append(row)
+            numbers.append(first + reader.line_num)
         elif row:
             faults["lines with a wrong number of columns"] += 1
-    time, known = _times([row[time_place] for row in rows], mapping.time, faults)
-    rows = [row for row, good in zip(rows, known, strict=True) if good]
-    missing = frozenset(mapping.missing)
-    values = {
-        column: _numbers([row[place].strip() for row in rows], missing, column, faults)
-        for column, place in zip(wanted, places, strict=True)
-    }
-    return Table(time, values, faults)
+    if not rows:
+        notes.append(f"{path.name}: the table has no rows")
+    local, known = _stamps([row[time_place] for row in rows], mapping.time.format)
+    unread = known.count(False)
+    if unread:
+        faults["lines without a readable time"] += unread
+        k = known.index(False)
+        notes.append(
+            f"{path.name}:{numbers[k]}: the time '{rows[k][time_place]}' cannot be read"
+            f"{_time_hint(rows[k][time_place].strip(), mapping.time.format)}"
+        )
+        rows = [row for row, good in zip(rows, known, strict=True) if good]
+        numbers = [number for number, good in zip(numbers, known, strict=True) if good]
+    time, told = to_utc(local, mapping.time.zone, path.name, numbers)
+    notes += told
+    values = {}
+    for column, place in zip(wanted, places, strict=True):
+        cells = [row[place].strip() for row in rows]
+        values[column], bad = _numbers(cells, mapping, column, faults)
+        if bad is not None:
+            notes.append(
+                f"{path.name}:{numbers[bad]}: '{cells[bad]}' in {column} cannot be read"
+                f"{_decimal_hint(cells[bad], mapping.decimal)}"
+            )
+    return Table(time, values, faults, tuple(notes))
+
+
+def _other_delimiter(names: list[str], wanted: str) -> str:
+    """Advice where a header looks as if something else stood between its columns."""
+    for other in (";", "\t", "|", ","):
+        parts = [part.strip().strip('"') for name in names for part in name.split(other)]
+        if len(parts) > len(names) and wanted in parts:
+            return f" Write `delimiter: {json.dumps(other)}` in the mapping."
+    return ""
+
+
+def _time_hint(text: str, given: str) -> str:
+    if given:
+        return f" with `time.format: {json.dumps(given)}`"
+    for form in USUAL_FORMATS:
+        if _stamp(text, form) is not None:
+            return f"; write `format: {json.dumps(form)}` under `time` in the mapping"
+    return ""
+
+
+def _decimal_hint(cell: str, decimal: str) -> str:
+    if decimal == "." and re.fullmatch(r"[+-]?\d+,\d+", cell):
+        return """; write `decimal: ","` in the mapping"""
+    return ""
 
 
 def _header(lines: list[str], mapping: Mapping, where: str) -> tuple[int, int]:
@@ -110,70 +176,53 @@ def _header(lines: list[str], mapping: Mapping, where: str) -> tuple[int, int]:
     return 0, 1
 
 
-def _times(
-    texts: list[str], column: TimeColumn, faults: Counter[str]
-) -> tuple[TimeArray, list[bool]]:
-    """Stamps in UTC and which rows have one."""
+def _stamps(texts: list[str], form: str) -> tuple[TimeArray, list[bool]]:
+    """Stamps of the local clock [ns], and which texts have one."""
     try:
-        if column.format:
+        if form:
             raise ValueError
-        plain = [text.strip().removesuffix("Z") for text in texts]
-        local = np.asarray(plain, dtype="datetime64[ns]").astype(np.int64)
-        known = [True] * len(texts)
+        plain = np.asarray([text.strip().removesuffix("Z") for text in texts], dtype=np.str_)
+        moments = plain.astype("datetime64[ns]")
+        if np.isnat(moments).any():
+            raise ValueError
+        return moments.astype(np.int64), [True] * len(texts)
     except ValueError:
-        stamps = [_stamp(text.strip(), column.format) for text in texts]
+        stamps = [_stamp(text.strip(), form) for text in texts]
         known = [stamp is not None for stamp in stamps]
-        local = np.asarray([stamp for stamp in stamps if stamp is not None], dtype=np.int64)
-        bad = known.count(False)
-        if bad:
-            faults["lines without a readable time"] += bad
-    return local - _offsets(local, column.zone), known
+        return np.asarray([s for s in stamps if s is not None], dtype=np.int64), known
 
 
 def _stamp(text: str, form: str) -> int | None:
     try:
         if form:
-            since = datetime.datetime.strptime(text, form).replace(tzinfo=None) - _EPOCH
+            since = datetime.datetime.strptime(text, form).replace(tzinfo=None) - EPOCH
             whole = since.days * 86_400 + since.seconds
             return whole * 1_000_000_000 + since.microseconds * 1000
-        return int(np.datetime64(text.removesuffix("Z"), "ns").astype(np.int64))
+        moment = np.datetime64(text.removesuffix("Z"), "ns")
+        return None if np.isnat(moment) else int(moment.astype(np.int64))
     except ValueError:
         return None
 
 
-def _offsets(local: TimeArray, zone: str) -> TimeArray | int:
-    """Local time minus UTC [ns]."""
-    if zone in {"UTC", "Z"}:
-        return 0
-    match = re.fullmatch(r"([+-])(\d{1,2}):?(\d{2})", zone)
-    if match is not None:
-        minutes = int(match[2]) * 60 + int(match[3])
-        return minutes * _MINUTE * (-1 if match[1] == "-" else 1)
-    try:
-        region = zoneinfo.ZoneInfo(zone)
-    except (zoneinfo.ZoneInfoNotFoundError, ValueError):
-        raise UserError(
-            f"'{zone}' is not a time zone.", "zone", "Write UTC, +01:00 or Europe/Berlin."
-        ) from None
-    hours, inverse = np.unique(local // (60 * _MINUTE), return_inverse=True)
-    offsets = []
-    for hour in hours.tolist():
-        naive = _EPOCH + datetime.timedelta(hours=hour)
-        shift = naive.replace(tzinfo=region).utcoffset()
-        offsets.append(int(shift.total_seconds()) * 1_000_000_000 if shift is not None else 0)
-    return np.asarray(offsets, dtype=np.int64)[inverse]
-
-
 def _numbers(
-    cells: list[str], missing: frozenset[str], column: str, faults: Counter[str]
-) -> FloatArray:
+    cells: list[str], mapping: Mapping, column: str, faults: Counter[str]
+) -> tuple[FloatArray, int | None]:
+    """Numbers, NaN where there is none, and the first cell that cannot be read."""
+    missing = frozenset(mapping.missing)
     values = np.full(len(cells), np.nan)
+    bad = None
     for index, cell in enumerate(cells):
         if cell in missing:
             faults[f"missing values in {column}"] += 1
             continue
         try:
-            values[index] = float(cell)
+            number = float(cell.replace(",", ".") if mapping.decimal == "," else cell)
         except ValueError:
             faults[f"unreadable values in {column}"] += 1
-    return values
+            bad = index if bad is None else bad
+            continue
+        if math.isfinite(number):
+            values[index] = number
+        else:
+            faults[f"values in {column} that are not finite"] += 1
+    return values, bad

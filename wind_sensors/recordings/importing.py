@@ -94,6 +94,7 @@ def import_files(
     """
     mapping = mapping_file.mapping
     faults: Counter[str] = Counter()
+    notes: list[str] = []
     read: list[dict[int, Samples]] = []
     delay = 0
     if mapping.time.mark == "start":
@@ -102,7 +103,7 @@ def import_files(
         if mapping.format == "nmea0183":
             read.append(_nmea_samples(file, mapping, faults))
         else:
-            read.append(_table_samples(file, mapping, delay, faults))
+            read.append(_table_samples(file, mapping, delay, faults, notes))
         advance(file)
     sources = mapping.sources
     merged = {
@@ -113,7 +114,9 @@ def import_files(
         raise UserError(
             "nothing in the files fits the mapping.",
             ", ".join(str(file) for file in files),
-            f"Left out: {describe(faults)}.",
+            " ".join(
+                (*([f"Left out: {describe(faults)}."] if faults else []), *(f"{n}." for n in notes))
+            ),
         )
     builder = _Builder(mapping_file.station.recording.frame, faults)
     for signal in mapping.signals:
@@ -123,7 +126,7 @@ def import_files(
     if mapping.platform is not None:
         builder.add_platform(mapping.platform, merged)
     topics = tuple(builder.messages())
-    notes = [*builder.notes, *_misspelt(mapping, mapping_file.station)]
+    notes += [*builder.notes, *_misspelt(mapping, mapping_file.station)]
     return Imported(topics, faults, tuple(notes))
 
 
@@ -155,15 +158,17 @@ def describe(faults: Counter[str]) -> str:
 
 
 def _table_samples(
-    file: Path, mapping: Mapping, delay: int, faults: Counter[str]
+    file: Path, mapping: Mapping, delay: int, faults: Counter[str], notes: list[str]
 ) -> dict[int, Samples]:
     table = read_table(file, mapping)
     faults.update(table.faults)
+    notes += table.notes
     time = table.time + delay
     out: dict[int, Samples] = {}
     for source in mapping.sources:
         raw = table.values[source.column]
         good = np.isfinite(raw)
+        good &= ~_impossible(source, raw, mapping, faults)
         out[id(source)] = Samples(time[good], in_message_units(source, raw[good]))
     return out
 
@@ -176,8 +181,33 @@ def _nmea_samples(file: Path, mapping: Mapping, faults: Counter[str]) -> dict[in
         time, raw, empty = nmea.samples(log, source)
         if empty:
             faults[f"{source.sentence} without field {source.value}"] += empty
-        out[id(source)] = Samples(time, in_message_units(source, raw))
+        good = ~_impossible(source, raw, mapping, faults)
+        out[id(source)] = Samples(time[good], in_message_units(source, raw[good]))
     return out
+
+
+def _impossible(
+    source: Source, raw: FloatArray, mapping: Mapping, faults: Counter[str]
+) -> npt.NDArray[np.bool_]:
+    """Directions beyond a turn and speeds of winds and platforms below nought, shape (n,).
+
+    A rotor's speed may be below nought by the error of an analogue output's zero.
+    """
+    if source.direction or any(source is vector.direction_from for vector in mapping.vectors):
+        wrong = np.abs(raw) > (2.0 * np.pi if source.unit == "rad" else 360.0)
+        what = "directions of more than a turn in"
+    elif any(source is speed for speed in mapping.speeds):
+        wrong = raw < 0.0
+        what = "speeds below nought in"
+    else:
+        return np.zeros(raw.size, dtype=np.bool_)
+    if wrong.any():
+        faults[f"{what} {_name_of(source)}"] += int(np.count_nonzero(wrong))
+    return np.asarray(wrong)
+
+
+def _name_of(source: Source) -> str:
+    return source.column or f"{source.sentence} field {source.value}"
 
 
 def in_message_units(source: Source, raw: FloatArray) -> FloatArray:
@@ -201,8 +231,7 @@ def _joined(parts: Sequence[Samples], source: Source, faults: Counter[str]) -> S
     _, first = np.unique(time, return_index=True)
     repeated = len(time) - len(first)
     if repeated:
-        name = source.column or f"{source.sentence} field {source.value}"
-        faults[f"values of {name} at an instant that has one already"] += repeated
+        faults[f"values of {_name_of(source)} at an instant that has one already"] += repeated
     return Samples(time[first], value[first])
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError, field_validator, model_validator
 from ruamel.yaml import YAML
 
 from wind_sensors.errors import UserError
+from wind_sensors.recordings.local_time import zone_fault
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.station.document import Document, parse
-from wind_sensors.station.model import Entry, Station
+from wind_sensors.station.inputs import absolute
+from wind_sensors.station.model import Entry, Input, Rotor, Station, Vane
 from wind_sensors.station.reading import station_of
 from wind_sensors.station.reference import entries_markdown
 
@@ -40,6 +43,17 @@ UNITS: dict[str, tuple[float, float]] = {
     "mV": (0.001, 0.0),
 }
 """Factor and offset to the unit of the messages: SI, with degrees Celsius for temperatures."""
+
+_DIMENSIONS = {
+    "m/s": "speed", "kn": "speed", "km/h": "speed", "mph": "speed",
+    "rad": "angle", "deg": "angle",
+    "degC": "temperature", "K": "temperature", "degF": "temperature",
+    "Pa": "pressure", "hPa": "pressure", "mbar": "pressure", "kPa": "pressure",
+    "%": "share", "m": "length", "mm": "length", "ft": "length",
+    "Hz": "frequency", "V": "voltage", "mV": "voltage",
+}  # fmt: skip
+_RAW = frozenset({"", "voltage", "share"})
+"""What any signal may come as: the station file's scale and offset make its unit of it."""
 
 
 _INTRODUCTION = """# Mapping file
@@ -153,10 +167,19 @@ class TimeColumn(Entry):
     format: str = ""
     """As for strptime; empty: ISO 8601."""
     zone: str = "UTC"
-    """UTC, an offset as +01:00, or a name as Europe/Berlin."""
+    """UTC, an offset as +01:00, or a name as Europe/Berlin: then the logger follows its summer
+    time, and the hour that comes twice is told by the order of the rows."""
     mark: Literal["end", "start"] = "end"
     """Whether the stamp is the end or the start of the station's `recording.averaging_time`; the
     messages get its end."""
+
+    @field_validator("zone", mode="before")
+    @classmethod
+    def _is_a_zone(cls, zone: object) -> object:
+        fault = zone_fault(str(zone))
+        if fault:
+            raise ValueError(fault)
+        return zone
 
 
 class Mapping(Entry):
@@ -168,6 +191,8 @@ class Mapping(Entry):
     """csv: names in the first line; toa5: Campbell Scientific; nrg: NRG logger exports."""
     delimiter: str = ""
     """Between a table's columns; empty: comma, and a tab for nrg."""
+    decimal: Literal[".", ","] = "."
+    """Sign before the decimals of a table's numbers."""
     missing: tuple[str, ...] = ("", "NAN", "NaN", "nan", "INF", "-INF", "NULL", "-9999")
     """Texts that stand for no value."""
     time: TimeColumn = TimeColumn()
@@ -193,6 +218,11 @@ class Mapping(Entry):
             found += [part for part in (parts.latitude, parts.longitude) if part is not None]
         return found
 
+    @property
+    def speeds(self) -> list[Source]:
+        """The numbers that are speeds of a wind or a platform."""
+        found = [vector.speed for vector in self.vectors]
+        return found if self.platform is None else [*found, self.platform.speed]
 
     @property
     def topics(self) -> list[str]:
@@ -247,14 +277,66 @@ def read_mapping(text: str, name: str) -> MappingFile:
     try:
         mapping = Mapping.model_validate(given)
     except ValidationError as error:
-        faults = []
-        for detail in error.errors(include_url=False):
-            path = tuple(detail["loc"])
-            key = ".".join(str(step) for step in path)
-            message = detail["msg"].removeprefix("Value error, ")
-            faults.append(f"\n  {document.where(path)}: {key}: {message}.")
-        raise UserError(f"{len(faults)} problems:{''.join(faults)}", name) from None
+        details = error.errors(include_url=False)
+        raise _refused(
+            document,
+            [(tuple(d["loc"]), d["msg"].removeprefix("Value error, ")) for d in details],
+        ) from None
+    wrong = list(_wrong_units(mapping, station))
+    if wrong:
+        raise _refused(document, wrong)
     return MappingFile(mapping, station, _dumped(YAML(typ="rt").load(text)["station"]))
+
+
+def _refused(document: Document, faults: list[tuple[tuple[int | str, ...], str]]) -> UserError:
+    told = [
+        f"\n  {document.where(path)}: {'.'.join(str(step) for step in path)}: {message}."
+        for path, message in faults
+    ]
+    count = "one problem" if len(told) == 1 else f"{len(told)} problems"
+    return UserError(f"{count}:{''.join(told)}", document.name)
+
+
+def _wrong_units(
+    mapping: Mapping, station: Station
+) -> Iterator[tuple[tuple[int | str, ...], str]]:
+    """Units that cannot be those of what a number is taken for, with their keys."""
+    read = _dimensions_read(station)
+    for k, signal in enumerate(mapping.signals):
+        topic = absolute(signal.topic)
+        allowed = read.get(topic)
+        if allowed and _DIMENSIONS.get(signal.unit, "") not in allowed | _RAW:
+            fault = f"'{signal.unit}' is no unit of the {' or '.join(sorted(allowed))} of {topic}"
+            yield ("signals", k, "unit"), fault
+    speeds: list[tuple[tuple[int | str, ...], Source]] = [
+        (("vectors", k, "speed", "unit"), vector.speed) for k, vector in enumerate(mapping.vectors)
+    ]
+    if mapping.platform is not None:
+        speeds.append((("platform", "speed", "unit"), mapping.platform.speed))
+    for path, source in speeds:
+        if _DIMENSIONS.get(source.unit, "speed") != "speed":
+            yield path, f"'{source.unit}' is no unit of a speed"
+
+
+def _dimensions_read(station: Station) -> dict[str, set[str]]:
+    """What the station takes from each topic: dimensions by its absolute name."""
+    found: dict[str, set[str]] = {}
+
+    def add(source: Input | None, *dimensions: str) -> None:
+        if source is not None:
+            found.setdefault(absolute(source.topic), set()).update(dimensions)
+
+    for entry in station.instruments:
+        if isinstance(entry, Rotor):
+            add(entry.pulses, "speed", "frequency", "angle")
+        elif isinstance(entry, Vane):
+            add(entry.joint_states, "angle")
+        else:
+            add(entry.azimuth, "angle")
+            add(entry.elevation, "angle")
+    add(station.air.temperature, "temperature")
+    add(station.air.pressure, "pressure")
+    return found
 
 
 def _dumped(node: Any) -> str:
