@@ -374,6 +374,25 @@ def test_plot_draws_every_figure_and_keeps_what_is_there(
     assert main([*command, "--force", "--only", "speed"]) == 0
 
 
+def test_the_detail_of_a_figure_holds_samples_whatever_their_distance() -> None:
+    quick = steady_recording()
+    figure = plots.draw("speed", quick, None)
+    assert figure is not None
+    assert figure.axes[1].get_title(loc="left") == "a minute of it"
+    time = START + np.arange(1, 301, dtype=np.int64) * 600_000_000_000
+    counts = Pulses(time, np.cumsum(np.full(300, 100.0)))
+    slow = replace(quick, pulses={"cup": counts}, stop=int(time[-1]), reference=None)
+    figure = plots.draw("speed", slow, None)
+    assert figure is not None
+    whole, part = figure.axes
+    assert part.get_title(loc="left") == "six hours of it"
+    assert np.size(part.get_lines()[0].get_xdata()) > 30
+    assert whole.get_xlabel().endswith("[d]") and part.get_xlabel().endswith("[h]")
+    spectra = plots.draw("spectra", slow, None)
+    assert spectra is not None
+    assert not spectra.axes[0].texts, "the inertial subrange lies beyond"
+
+
 def test_figures_are_the_same_every_time(tmp_path: Path) -> None:
     folder = write_recording(tmp_path / "steady", steady_recording())
     texts = []

@@ -136,12 +136,30 @@ def test_the_page_gives_the_evidence_for_a_name() -> None:
     text = page(replace(found, findings=(small,)))
     assert (
         "The mismatch is largest <b>at 0.08 to 0.14 Hz</b> (cup, rotor rate): the residual "
-        "scatters by 0.485 m/s in all, p = 0.078 after looking everywhere. The effect removes "
-        "50 % of the whole misfit and lowers minus twice the log-likelihood by 88: that names it"
+        "scatters by 0.485 m/s in all, p = 0.078 after looking everywhere. On the data that "
+        "it was fitted to the effect removes 50 % of the whole misfit and lowers minus twice the "
+        "log-likelihood by 88: that names it"
     ) in text
     assert finding_json(small, 400.0)["gain"] == 88.12
     assert finding_json(replace(small, gain=0.0), 400.0)["gain"] is None
     assert "that names it" not in page(replace(found, findings=(replace(small, p=0.002),)))
+
+
+def test_grey_is_explained_where_there_is_grey() -> None:
+    found = stepped()
+    assert "grey is what healthy days show" in page(found), "the raw signals depart"
+    elsewhere = Region("cup/rotor_rate", "all", 0.0, 0.0, "")
+    only = replace(found.findings[0], located=Found(elsewhere, 9.0, 0.5, "m/s"))
+    assert "grey" not in page(replace(found, findings=(only,)))
+
+
+def test_names_in_equations_are_set_apart() -> None:
+    effect = catalogue()["bearing_friction"]
+    assert "`" in effect.equation
+    found = stepped()
+    term = replace(found.findings[0].term, effect=effect)
+    told = page(replace(found, findings=(replace(found.findings[0], term=term, proof=None),)))
+    assert "<i>breakaway</i>" in told
 
 
 def test_nothing_blue_is_promised_where_nothing_is_named() -> None:

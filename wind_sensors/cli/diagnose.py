@@ -124,7 +124,11 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
         for finding in diagnosis.findings:
             removed = ""
             if finding.proof is not None:
-                removed = f"{100.0 * finding.proof.excess_removed:.0f} %"
+                proof = finding.proof
+                removed = (
+                    f"{100.0 * proof.excess_removed:.0f} % "
+                    f"({100.0 * proof.low:.0f} to {100.0 * proof.high:.0f} %)"
+                )
             for k, size in enumerate(sizes_of(finding, diagnosis.station)):
                 table.add_row(
                     finding.term.effect.name if k == 0 else "",
@@ -135,7 +139,10 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
                     removed if k == 0 else "",
                 )
         console.print(table)
-        console.print("held out: share of the excess misfit removed on data that were not fitted")
+        console.print(
+            "held out: share of the excess misfit removed on data that were not fitted, with its "
+            "95 % interval"
+        )
     if diagnosis.left_over:
         console.print(f"left over: {diagnosis.left_over}")
     if not diagnosis.calibrated:

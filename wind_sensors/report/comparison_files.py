@@ -103,17 +103,18 @@ def write(
                "silent": silent_json(silent), "notes": list(comparison.recording.notes),
                "regions": regions, "p": p}  # fmt: skip
     rows = "".join(
-        f"<tr><td>{escape(f.region.channel)}</td><td>{escape(f.region.label)}</td>"
+        f"<tr><td>{escape(channel_words(f.region.channel))}</td><td>{escape(f.region.label)}</td>"
         f"<td class='n'>{f.excess:.3g} {escape(f.unit)}</td><td class='n'>{f.score:.1f}</td></tr>"
         for f in found
     )
     means = "".join(
-        f"<tr><td>{escape(c['channel'])}</td><td class='n'>{c['mean']:.3g} {c['unit']}</td>"
+        f"<tr><td>{escape(channel_words(c['channel']))}</td>"
+        f"<td class='n'>{c['mean']:.3g} {c['unit']}</td>"
         f"<td class='n'>{c['rms']:.3g} {c['unit']}</td></tr>"
         for c in summary
     )
     means += "".join(
-        f"<tr><td>{escape(name)}</td><td class='n'>{NO_READINGS}</td>"
+        f"<tr><td>{escape(channel_words(name))}</td><td class='n'>{NO_READINGS}</td>"
         f"<td class='n'>{NO_READINGS}</td></tr>"
         for name in unread(comparison)
     )
@@ -128,10 +129,11 @@ def write(
     body = (
         f"<header><div class='muted'>{escape(comparison.recording.name)} · wind compare</div>"
         "<h1>Recorded minus simulated</h1><div class='scroll'><table><tr><th>channel</th>"
-        f"<th>mean</th><th>rms</th></tr>{means}</table></div>{told}</header>"
+        f"<th class='n'>mean</th><th class='n'>rms</th></tr>{means}</table></div>{told}</header>"
         f"<section>{figures}</section><section><h2>Where it stands out</h2>"
         f"<p>p = {p:.3g} for the largest, after looking everywhere.</p><div class='scroll'>"
-        "<table><tr><th>channel</th><th>where</th><th>residual</th><th>score</th></tr>"
+        "<table><tr><th>channel</th><th>where</th>"
+        "<th class='n'>residual</th><th class='n'>score</th></tr>"
         f"{rows}</table></div></section>"
     )
     topics: list[TopicMessages] = series_topics(

@@ -35,6 +35,9 @@ _TELLING_LEVELS = 3.5
 """Levels of quick eddies are drawn if the mean over so many of them departs further than this, in
 its own standard deviations."""
 
+_HIGHEST_RATIO = 3.0
+"""Ratios of power beyond it are drawn as triangles at the edge."""
+
 _FURTHEST = 40.0
 """Beyond so many standard deviations a point is drawn at the edge, with its number."""
 
@@ -298,8 +301,12 @@ def _spectra(
         pairs.append((corrected, style.CORRECTED))
     for expected, colour in pairs:
         other = spectra.band_means(expected.cosine[channel.name] ** 2, edges)
-        axes.semilogx(frequency, power / np.maximum(other, 1e-12), "o-", color=colour, ms=3.0)
+        ratio = power / np.maximum(other, 1e-12)
+        axes.semilogx(frequency, ratio, "o-", color=colour, ms=3.0)
+        above = ratio > _HIGHEST_RATIO
+        edge = np.full(np.count_nonzero(above), 0.98 * _HIGHEST_RATIO)
+        axes.plot(frequency[above], edge, "^", color=colour, ms=5.0)
     axes.axhline(1.0, color=style.MUTED, linewidth=0.8)
-    axes.set_ylim(0.0, 3.0)
+    axes.set_ylim(0.0, _HIGHEST_RATIO)
     axes.set_xlabel("frequency in Hz")
     axes.set_ylabel("recorded / simulated power")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import partial
 from html import escape
@@ -130,17 +131,23 @@ def _physics(finding: Finding, station: Station) -> str:
     region = finding.located.region
     return (
         f"<section><h2>The physics: {escape(words(effect.name))}</h2>"
-        f"<span class='eq'>{escape(effect.equation)}</span>"
+        f"<span class='eq'>{_equation(effect.equation)}</span>"
         f"<p class='muted'>{escape(effect.source)}. It shows in: {escape(effect.region)}.</p>"
         f"<div class='scroll'><table><tr><th>parameter</th><th class='n'>value</th>"
         f"<th class='n'>95 % interval</th>"
         f"<th>unit</th></tr>{rows}</table></div>"
         f"<p>The mismatch is largest <b>{escape(where_text(region))}</b> "
         f"({escape(channel_words(region.channel))}): {_mismatch(finding.located)}, "
-        f"p = {finding.p:.3g} after looking everywhere. The effect removes "
-        f"{100.0 * finding.share:.0f} % of the whole misfit{_gain(finding)}.</p>"
+        f"p = {finding.p:.3g} after looking everywhere. On the data that "
+        f"it was fitted to the effect removes {100.0 * finding.share:.0f} % of the whole misfit"
+        f"{_gain(finding)}.</p>"
         "</section>"
     )
+
+
+def _equation(text: str) -> str:
+    """An equation with its words; what is quoted is a name."""
+    return re.sub(r"`([^`]+)`", r"<i>\1</i>", escape(text))
 
 
 _AT = {
@@ -196,7 +203,8 @@ def _proof(finding: Finding) -> str:
     return (
         "<section><h2>The proof, on data that were not fitted</h2>"
         "<p>Every other block of the record was fitted, the blocks between were scored, and the "
-        "other way round, with gaps between them.</p>"
+        "other way round, with gaps between them. What is removed here counts, not the share of "
+        "the fitted data, which any fit makes look good.</p>"
         f"<div class='bar'><i style='width:{100.0 * share:.0f}%'></i></div>"
         f"<p><b>{100.0 * proof.excess_removed:.0f} %</b> of the excess misfit disappears "
         f"(95 % interval {100.0 * proof.low:.0f} to {100.0 * proof.high:.0f} %). Whitened misfit "
@@ -345,14 +353,15 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
     }
     corrected = diagnosis.corrected if diagnosis.findings else None
     comparison, simulated = diagnosis.comparison, diagnosis.simulated
-    figures = []
+    figures: list[str] = []
+    grey = False
     for channel in comparison.channels:
         if channel.name not in wanted:
             continue
         known = diagnosis.baseline.channels[channel.name]
         shown = (comparison, simulated, corrected, channel)
         beside_healthy = (comparison, known, simulated, corrected, channel)
-        figures += [
+        drawn = [
             in_both_cuts(partial(draw, *of), f"{what} of {channel_words(channel.name)}")
             for what, draw, of in (
                 ("recorded minus simulated", residual_figure, shown),
@@ -360,6 +369,8 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
                 ("raw signals", statistics_figure, beside_healthy),
             )
         ]
+        figures += drawn
+        grey = grey or any(drawn[1:])
     body = [
         f"<header class='verdict {diagnosis.verdict}'><div class='muted'>"
         f"{escape(diagnosis.recording)} · wind diagnose</div>"
@@ -367,7 +378,7 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         f"<section><h2>{'Before and after' if corrected else 'Recorded minus simulated'}</h2>"
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
         f"described. {'Blue: with the named physics. ' if corrected else ''}Bars are two standard "
-        "errors; grey is what healthy days show.</p>"
+        f"errors{'; grey is what healthy days show' if grey else ''}.</p>"
         + "".join(figures)
         + "</section>",
         *(_physics(f, diagnosis.station) for f in diagnosis.findings),

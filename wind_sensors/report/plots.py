@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from scipy.signal import welch
 
 from wind_sensors.motion.frames import compass_from_yaw, direction_from_deg, heading_of
@@ -16,7 +17,16 @@ from wind_sensors.station.model import Cup, Propeller
 from wind_sensors.station.signals import FloatArray, Pulses, Recording, TimeArray
 
 _ZOOM = 60.0
-"""Length of the detail in time series [s]."""
+"""Length of the detail in time series [s], where samples come at least every second."""
+_ZOOM_SAMPLES = 20.0
+"""And in samples, where they come more slowly."""
+_ROUND_SPANS = (60.0, 600.0, 3600.0, 21_600.0, 86_400.0, 604_800.0)
+"""Lengths that the detail may have [s]."""
+_SPAN_WORDS = ("a minute", "ten minutes", "an hour", "six hours", "a day", "a week")
+_UNITS = ((2.0 * 86_400.0, 86_400.0, "d"), (3.0 * 3600.0, 3600.0, "h"), (0.0, 1.0, "s"))
+"""Axes longer than the first [s] are in units of the second [s], called so."""
+_SLOPE_SPAN = (0.05, 2.0)
+"""Where the inertial subrange's slope is drawn [Hz], as far as there are spectra."""
 _RATE = 10.0
 """Of the grid for spectra [Hz]."""
 _NINETY_PERCENT = 1.6449
@@ -75,7 +85,7 @@ def speed_figure(recording: Recording, estimates: Estimates | None) -> Figure | 
         return None
     made, axes = style.figure(2)
     apparent = recording.station.platform is not None
-    for panel, span in zip(axes, _spans(recording), strict=True):
+    for panel, span in zip(axes, _spans(recording, [time for _, time, _, _ in lines]), strict=True):
         step = 1.0 if span[1] - span[0] > 5.0 * _ZOOM else 0.0
         for label, time, value, colour in lines:
             seconds = _since(recording, time)
@@ -86,7 +96,7 @@ def speed_figure(recording: Recording, estimates: Estimates | None) -> Figure | 
             _speed_band(panel, recording, estimates, span, step)
         panel.set_ylabel("speed [m/s]")
         panel.set_ylim(bottom=0.0)
-        panel.set_xlim(span)
+        _time_axis(panel, span)
     title = "Wind speed" + (" (the rotor's is relative to the moving platform)" if apparent else "")
     _finish(axes, title)
     return made
@@ -113,7 +123,7 @@ def direction_figure(recording: Recording, estimates: Estimates | None) -> Figur
         return None
     middle = _circular_mean(lines[0][2])
     made, axes = style.figure(2)
-    for panel, span in zip(axes, _spans(recording), strict=True):
+    for panel, span in zip(axes, _spans(recording, [time for _, time, _, _ in lines]), strict=True):
         for label, time, value, colour in lines:
             around = middle + np.mod(value - middle + 180.0, 360.0) - 180.0
             seconds = _since(recording, time)
@@ -121,7 +131,7 @@ def direction_figure(recording: Recording, estimates: Estimates | None) -> Figur
             panel.plot(x, y, color=colour, lw=1.0, label=label)
         panel.yaxis.set_major_formatter(lambda degrees, _: f"{degrees % 360.0:.0f}\N{DEGREE SIGN}")
         panel.set_ylabel("from, clockwise from north")
-        panel.set_xlim(span)
+        _time_axis(panel, span)
     _finish(axes, "Direction the wind comes from")
     return made
 
@@ -143,7 +153,7 @@ def spectra_figure(recording: Recording, estimates: Estimates | None) -> Figure 
         series.append(("corrected", estimates.time, speed, style.CORRECTED))
     made, (panel,) = style.figure(1, 4.4)
     drawn = 0
-    top = 0.0
+    top, ends = 0.0, [np.inf, 0.0]
     for label, time, value, colour in series:
         if len(time) < 64 or int(time[-1]) - int(time[0]) < 60_000_000_000:
             continue
@@ -151,13 +161,16 @@ def spectra_figure(recording: Recording, estimates: Estimates | None) -> Figure 
         frequency, density = _spectrum(time, value, interval)
         panel.loglog(frequency, frequency * density, color=colour, label=label)
         top = max(top, float(np.max(frequency * density)))
+        ends = [min(ends[0], float(frequency[0])), max(ends[1], float(frequency[-1]))]
         drawn += 1
     if not drawn:
         return None
-    line = np.asarray([0.05, 2.0])
-    panel.loglog(line, top * (line / 0.05) ** (-2.0 / 3.0), color=style.MUTED, ls="--", lw=1.0)
-    panel.annotate("slope -2/3", (0.3, top * 6.0 ** (-2.0 / 3.0)), (4, 5), color=style.MUTED,
-                   textcoords="offset points")  # fmt: skip
+    line = np.clip(np.asarray(_SLOPE_SPAN), ends[0], ends[1])
+    if line[1] > 4.0 * line[0]:
+        level = top * (line / line[0]) ** (-2.0 / 3.0)
+        panel.loglog(line, level, color=style.MUTED, ls="--", lw=1.0)
+        panel.annotate("slope -2/3", np.exp(np.log((line, level)).mean(axis=1)), (4, 5),
+                       color=style.MUTED, textcoords="offset points")  # fmt: skip
     panel.set_ylim(top * 1e-4, top * 2.0)
     panel.set_xlabel("frequency [Hz]")
     panel.set_ylabel("frequency x spectral density [m\u00b2/s\u00b2]")
@@ -248,11 +261,36 @@ def _since(recording: Recording, time: TimeArray) -> FloatArray:
     return np.asarray((time - recording.start) * 1e-9, dtype=np.float64)
 
 
-def _spans(recording: Recording) -> list[tuple[float, float]]:
-    """The whole recording and a minute in its middle [s]."""
+def _spans(recording: Recording, times: list[TimeArray]) -> list[tuple[float, float]]:
+    """The whole recording and a part in its middle that holds enough of the samples [s]."""
     length = (recording.stop - recording.start) * 1e-9
-    start = max(0.5 * (length - _ZOOM), 0.0)
-    return [(0.0, length), (start, min(start + _ZOOM, length))]
+    between = [float(np.median(np.diff(time))) * 1e-9 for time in times if len(time) > 1]
+    wanted = max(_ZOOM, _ZOOM_SAMPLES * max(between, default=0.0))
+    zoom = next((span for span in _ROUND_SPANS if span >= wanted), _ROUND_SPANS[-1])
+    start = max(0.5 * (length - zoom), 0.0)
+    return [(0.0, length), (start, min(start + zoom, length))]
+
+
+def _time_axis(panel: Axes, span: tuple[float, float]) -> None:
+    """Limits and label of an axis whose data are in seconds, in a unit that fits its length."""
+    unit, name = next((u, n) for least, u, n in _UNITS if span[1] - span[0] >= least)
+    panel.set_xlim(span)
+    if unit != 1.0:
+        panel.xaxis.set_major_locator(_InUnits(unit))
+        panel.xaxis.set_major_formatter(lambda seconds, _: f"{seconds / unit:g}")
+    panel.set_xlabel(f"time since the start [{name}]")
+
+
+class _InUnits(MaxNLocator):
+    """Ticks at round numbers of a unit [s]."""
+
+    def __init__(self, unit: float) -> None:
+        super().__init__(nbins=9, steps=[1, 2, 3, 5, 6, 10])
+        self._unit = unit
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        ticks = super().tick_values(vmin / self._unit, vmax / self._unit)
+        return [float(tick) * self._unit for tick in ticks]
 
 
 def _thinned(
@@ -292,8 +330,10 @@ def _speed_band(
 
 def _finish(axes: list[Axes], title: str) -> None:
     axes[0].set_title(title)
-    axes[1].set_title("a minute of it", fontsize=9.5, fontweight="normal")
-    axes[-1].set_xlabel("time since the start [s]")
+    low, high = axes[1].get_xlim()
+    shown = [w for s, w in zip(_ROUND_SPANS, _SPAN_WORDS, strict=True) if np.isclose(s, high - low)]
+    part = f"{shown[0]} of it" if shown else ""
+    axes[1].set_title(part, fontsize=9.5, fontweight="normal")
     axes[1].legend(loc="upper right", ncols=4, bbox_to_anchor=(1.0, 1.16), columnspacing=1.2)
 
 
