@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
-from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming, no_terms
+from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming, empty_fit
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term
@@ -129,6 +129,6 @@ def drift(interval: Interval = ALWAYS) -> Term:
 
 def named(searcher: Searcher, term: Term, alternatives: tuple[Alternative, ...] = ()) -> Naming:
     null = searcher.whitener(searcher.bank.without)
-    nothing = no_terms(null, searcher)
+    nothing = empty_fit(null, searcher)
     one = fit(null, STATION, [term], None, iterations=0)
     return Naming(one, null, null, nothing.vector, 1000.0, alternatives)

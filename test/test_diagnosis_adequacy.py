@@ -22,7 +22,7 @@ from wind_sensors.diagnosis.explaining.acceptance import (
     is_plausible,
     passing_gain,
 )
-from wind_sensors.diagnosis.explaining.explanation import judged, no_terms
+from wind_sensors.diagnosis.explaining.explanation import empty_fit, judged
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
@@ -224,7 +224,7 @@ def test_a_filter_shows_in_the_power_of_eddies_or_is_none() -> None:
         searcher = searcher_of(prepare(recorded(station, 67)), baseline(), catalogue(), {})
         null = searcher.whitener(searcher.bank.without)
         after = fit(null, STATION, [Term(low_pass, "vane", constant)], None, iterations=0)
-        before = no_terms(null, searcher)
+        before = empty_fit(null, searcher)
         gained.append(gained_by_eddies(null, before, after))
     assert gained[0] > EDDIES_AGAINST
     assert gained[1] < -EDDIES_AGAINST

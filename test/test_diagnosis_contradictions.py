@@ -17,9 +17,9 @@ from wind_sensors.diagnosis.explaining.beside import Beside
 from wind_sensors.diagnosis.explaining.explanation import (
     Judged,
     Naming,
-    evidence,
+    empty_fit,
     judged,
-    no_terms,
+    penalised_deviance,
 )
 from wind_sensors.diagnosis.explaining.fitting import fit
 from wind_sensors.diagnosis.explaining.leading import held_throughout
@@ -284,9 +284,9 @@ def test_what_holds_throughout_is_not_said_to_pass(planted: Interval) -> None:
     passing = Term(catalogue()["vane_offset"], "vane", {"offset": 8.0}, (150.0, 300.0))
     one = fit(null, STATION, [passing], searcher.bank.without)
     null = searcher.whitener(one.simulated)
-    kept = held_throughout(searcher, Judged(one, evidence(one, null), lambda: null), None)
+    kept = held_throughout(searcher, Judged(one, penalised_deviance(one, null), lambda: null), None)
     assert kept.fit.terms[0].interval == planted
-    assert no_terms(null, searcher).cost > kept.fit.cost
+    assert empty_fit(null, searcher).cost > kept.fit.cost
 
 
 def test_what_would_miss_the_eddies_of_the_whole_record_is_not_said_to_hold_throughout(
@@ -298,7 +298,7 @@ def test_what_would_miss_the_eddies_of_the_whole_record_is_not_said_to_hold_thro
     )
     one = fit(null, STATION, [passing], searcher.bank.without)
     null = searcher.whitener(one.simulated)
-    candidate = Judged(one, evidence(one, null), lambda: null)
+    candidate = Judged(one, penalised_deviance(one, null), lambda: null)
     assert held_throughout(searcher, candidate, None).fit.terms[0].interval == ALWAYS
     monkeypatch.setattr(leading, "calms_too_much", lambda *_: True)
     assert held_throughout(searcher, candidate, None).fit.terms[0].interval == (150.0, None)
@@ -314,7 +314,7 @@ def test_a_part_that_explains_less_than_the_whole_only_hides_where_eddies_are_mi
         monkeypatch.setattr(rounds, "calms_too_much", lambda *_: True)
     sticks = Term(catalogue()["vane_friction"], "vane", {"friction_speed": 2.0})
     always = judged(searcher, [fit(null, STATION, [sticks], searcher.bank.without)])
-    parts = rounds._where_they_calm(searcher, no_terms(null, searcher), always, None)
+    parts = rounds._where_they_calm(searcher, empty_fit(null, searcher), always, None)
     assert [part.fit.terms[-1].interval for part in parts] == [planted] * (planted != ALWAYS)
 
 

@@ -18,8 +18,8 @@ from wind_sensors.diagnosis.explaining import acceptance
 from wind_sensors.diagnosis.explaining.acceptance import calms_too_much
 from wind_sensors.diagnosis.explaining.explanation import (
     Judged,
+    empty_fit,
     judged,
-    no_terms,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.moments import is_late_again, is_steady, single_event
@@ -52,7 +52,7 @@ def test_what_passes_gains_all_the_time_that_it_holds(
     searcher: Searcher, begin: float, end: float, steady: bool
 ) -> None:
     comparison = searcher.comparison
-    nothing = no_terms(searcher.whitener(searcher.bank.without), searcher)
+    nothing = empty_fit(searcher.whitener(searcher.bank.without), searcher)
     at = comparison.grid.centres + comparison.drive.elapsed
     noise = np.random.default_rng(3).standard_normal(comparison.grid.n)
     misfit = np.where((at > begin) & (at < end), np.sqrt(180.0 / (end - begin)), 0.0)
@@ -87,7 +87,7 @@ def test_a_gust_is_taken_off_a_gain_but_not_that_one_moment_is_always_the_best(
     searcher: Searcher, gust: float, acts_then: bool, taken_off: bool
 ) -> None:
     comparison = searcher.comparison
-    nothing = no_terms(searcher.whitener(searcher.bank.without), searcher)
+    nothing = empty_fit(searcher.whitener(searcher.bank.without), searcher)
     seconds = comparison.grid.centres
     steady = np.full(comparison.grid.n, 2.0 * 24 / comparison.grid.n)
     lasting = 0.08 * seconds[-1]
@@ -118,7 +118,7 @@ def test_one_swing_of_the_wind_makes_no_clock_late(
     searcher: Searcher, name: str, values: dict[str, float], steadily: float, again: bool
 ) -> None:
     comparison = searcher.comparison
-    nothing = no_terms(searcher.whitener(searcher.bank.without), searcher)
+    nothing = empty_fit(searcher.whitener(searcher.bank.without), searcher)
     n = comparison.grid.n
     swing = np.where(np.abs(np.arange(n) - 0.6 * n) < 0.01 * n, np.sqrt(60.0 / (0.02 * n)), 0.0)
     misfit = np.hypot(swing, np.sqrt(steadily / n))
@@ -137,7 +137,7 @@ def test_where_another_effect_passes_one_that_the_screening_hardly_sees_is_tried
     searcher: Searcher,
 ) -> None:
     null = searcher.whitener(searcher.bank.without)
-    nothing = no_terms(null, searcher)
+    nothing = empty_fit(null, searcher)
     gap = Term(
         catalogue()["potentiometer_gap"],
         "vane",
@@ -211,7 +211,7 @@ def test_what_takes_eddies_away_that_the_signals_have_calms_too_much(
     term = Term(catalogue()[effect], "vane", values)
     found = fit(null, STATION, [term], searcher.bank.without, iterations=0)
     (one,) = judged(searcher, [found])
-    assert calms_too_much(searcher, one, no_terms(null, searcher)) is too_much
+    assert calms_too_much(searcher, one, empty_fit(null, searcher)) is too_much
 
 
 def test_a_delay_is_not_asked_what_becomes_of_eddies(
@@ -222,7 +222,7 @@ def test_a_delay_is_not_asked_what_becomes_of_eddies(
     found = fit(null, STATION, [late], searcher.bank.without, iterations=0)
     monkeypatch.setattr(acceptance, "gained_by_eddies", lambda *_: -1000.0)
     (one,) = judged(searcher, [found])
-    assert not calms_too_much(searcher, one, no_terms(null, searcher))
+    assert not calms_too_much(searcher, one, empty_fit(null, searcher))
 
 
 def test_a_grease_tells_nothing_of_its_stiffening_within_minutes_at_one_temperature() -> None:
@@ -274,11 +274,11 @@ def test_a_vane_that_counts_backwards_for_a_while_is_sought_moment_by_moment() -
 
 def test_what_turns_the_whole_wind_is_tried_from_the_best_moment_on(searcher: Searcher) -> None:
     null = searcher.whitener(searcher.bank.without)
-    nothing = no_terms(null, searcher)
+    nothing = empty_fit(null, searcher)
     lean = Term(catalogue()["axis_tilt"], "station", {"tilt_x": 20.0, "tilt_y": 0.0})
 
-    def seen(term: Term, evidence: float) -> Judged:
-        return Judged(replace(nothing, terms=(term,)), evidence, lambda: null)
+    def seen(term: Term, deviance: float) -> Judged:
+        return Judged(replace(nothing, terms=(term,)), deviance, lambda: null)
 
     def tried(
         interval: Interval, ahead: float, *lasting: Judged

@@ -44,4 +44,4 @@ def test_an_explanation_is_judged_though_its_judgement_is_not_kept() -> None:
     ]
     first, again = judged(searcher, fits), judged(searcher, fits)
     assert len(first) == len(again) == len(fits)
-    assert [r.evidence for r in again] == [r.evidence for r in first]
+    assert [r.penalised_deviance for r in again] == [r.penalised_deviance for r in first]

@@ -26,9 +26,9 @@ from wind_sensors.diagnosis.explaining.bounds import without_spare
 from wind_sensors.diagnosis.explaining.explanation import (
     Judged,
     Naming,
-    evidence,
+    empty_fit,
     judged,
-    no_terms,
+    penalised_deviance,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit, covariance_of, fit
 from wind_sensors.diagnosis.explaining.guesses import guesses_of
@@ -345,7 +345,7 @@ def test_of_explanations_as_good_the_one_of_what_stands_out_leads() -> None:
     recording = replace(recorded(station, 72), station=STATION)
     searcher = searcher_of(prepare(recording), baseline(), catalogue(), {})
     null = searcher.whitener(searcher.bank.without)
-    nothing = no_terms(null, searcher)
+    nothing = empty_fit(null, searcher)
 
     def explained(effect: str, instrument: str, **values: float) -> Judged:
         term = Term(catalogue()[effect], instrument, values)
@@ -382,11 +382,11 @@ def test_what_explains_a_region_that_chance_hardly_makes_needs_less(
     both = with_effect(both, catalogue()["calibration_offset"], "cup", {"offset": 0.5})
     searcher = compared(both)
     null = searcher.whitener(searcher.bank.without)
-    nothing = no_terms(null, searcher)
+    nothing = empty_fit(null, searcher)
     # The turned vane is the clearer of the two.
     term = Term(catalogue()[effect], instrument, values)
     (one,) = judged(searcher, [fit(null, STATION, [term], searcher.bank.without)])
-    brings = brought(searcher, one, nothing, evidence(nothing, null))
+    brings = brought(searcher, one, nothing, penalised_deviance(nothing, null))
     assert brings > 0.0
     monkeypatch.setattr(
         "wind_sensors.diagnosis.explaining.leading.needed_gain", lambda *_: brings / share

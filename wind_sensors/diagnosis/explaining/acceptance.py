@@ -13,8 +13,8 @@ from wind_sensors.diagnosis.explaining.bounds import run_away
 from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     Judged,
-    no_terms,
-    total,
+    empty_fit,
+    penalised_cost,
 )
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.moments import (
@@ -145,7 +145,7 @@ def passing_gain(term: Term, beside: bool = False) -> float:
     return times * (PASSING_SMOOTH_GAIN if term.effect.smooths else PASSING_GAIN)
 
 
-def brought(searcher: Searcher, candidate: Judged, current: Fit, before_evidence: float) -> float:
+def brought(searcher: Searcher, candidate: Judged, current: Fit, before_deviance: float) -> float:
     """What a candidate gains over the terms before: in its own null and in likelihood, the less.
 
     In its own null alone a flexible effect gains from the noise that it has fitted away. What one
@@ -164,13 +164,13 @@ def brought(searcher: Searcher, candidate: Judged, current: Fit, before_evidence
         return -np.inf
     if not is_late_again(comparison, before, candidate.fit):
         return -np.inf
-    if too_small(searcher, candidate.fit, total(before)):
+    if too_small(searcher, candidate.fit, penalised_cost(before)):
         return -np.inf
     if _calms_too_much(candidate, before):
         return -np.inf
-    gain = total(before) - total(candidate.fit)
+    gain = penalised_cost(before) - penalised_cost(candidate.fit)
     gain -= single_event(comparison, before, candidate.fit)
-    return min(gain, before_evidence - candidate.evidence)
+    return min(gain, before_deviance - candidate.penalised_deviance)
 
 
 def calms_too_much(searcher: Searcher, candidate: Judged, current: Fit) -> bool:
@@ -196,7 +196,7 @@ def _before(searcher: Searcher, candidate: Judged, current: Fit) -> Fit:
     """The terms before a candidate's newest one, fitted in its null."""
     whitener = candidate.whitener
     if not current.terms:
-        return no_terms(whitener, searcher)
+        return empty_fit(whitener, searcher)
     return fit(whitener, searcher.station, current.terms, searcher.bank.without, least=ROUGHLY)
 
 
@@ -434,7 +434,7 @@ def too_small(searcher: Searcher, candidate: Fit, nothing: float) -> bool:
     """
     if len(candidate.terms) != 1 or large_enough(candidate.terms[0]):
         return False
-    return is_calm(searcher.comparison) or nothing - total(candidate) < SURE_ALONE_GAIN
+    return is_calm(searcher.comparison) or nothing - penalised_cost(candidate) < SURE_ALONE_GAIN
 
 
 def large_enough(term: Term, least: float = SMALLEST_SIZE) -> bool:

@@ -11,11 +11,11 @@ import numpy as np
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.acceptance import is_a_stall, may_join
 from wind_sensors.diagnosis.explaining.explanation import (
-    evidence,
-    in_own_noise,
-    no_terms,
+    deviance_in_own_noise,
+    empty_fit,
+    penalised_cost,
+    penalised_deviance,
     seen_in,
-    total,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.onsets import window_starts
@@ -116,7 +116,7 @@ class Beside:
         ]
         known = {starts[0].key: starts for starts in candidates}
         alone = [f for f in self.singles if f.terms[0].interval == ALWAYS and eligible(f.terms)]
-        large = [*sorted(alone, key=total)[:LARGE_CANDIDATES], *self._apart]
+        large = [*sorted(alone, key=penalised_cost)[:LARGE_CANDIDATES], *self._apart]
         for term in (*(single.terms[0] for single in large), *hidden):
             if not eligible([term]):
                 continue
@@ -140,13 +140,13 @@ def _promising_apart(searcher: Searcher, current: Fit, singles: Sequence[Fit]) -
         singles: Fits of single effects.
     """
     null = searcher.whitener(searcher.bank.without)
-    so_far = evidence(no_terms(null, searcher), null)
+    so_far = penalised_deviance(empty_fit(null, searcher), null)
     apart = [
         f
         for f in singles
         if f.terms[0].interval == ALWAYS and searcher.is_apart(current, f.terms[0])
     ]
-    own = in_parallel(lambda f: in_own_noise(searcher, f), apart, searcher.workers)
+    own = in_parallel(lambda f: deviance_in_own_noise(searcher, f), apart, searcher.workers)
     promising = [
         (cost, f)
         for cost, f in zip(own, apart, strict=True)

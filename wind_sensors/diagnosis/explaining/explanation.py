@@ -1,4 +1,15 @@
-"""Explanations of a recording: what they cost, what they must bring, what a naming holds."""
+"""Explanations of a recording: what they cost, what they must bring, what a naming holds.
+
+How well an explanation fits is measured in four ways, each the smaller the better:
+
+- its *cost* (`Fit.cost`), minus twice the log-likelihood but for what the noise is worth, which
+  compares explanations in the same null only;
+- its *deviance* (`Whitener.deviance`), minus twice the whole log-likelihood, which compares
+  explanations that are each judged in the noise that they leave themselves, too;
+- either of them *penalised* for its parameters, beginnings and ends (`penalty_of`).
+
+What it *brings*, or *gains*, is by how much one of these drops.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +26,7 @@ from wind_sensors.diagnosis.explaining.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_PARAMETER,
     Searcher,
-    interval_cost,
+    interval_penalty,
 )
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.explaining.terms import Term
@@ -29,15 +40,22 @@ EQUAL_SHARE = 0.03
 exact enough to tell them apart."""
 
 CLEARLY_BETTER = 12.0
-"""Drop of the penalised cost at which two effects take the place of another explanation, which an
-explanation must not miss to compete with another, and which a beginning or an end must bring."""
+"""Drop of the penalised deviance at which two effects take the place of another explanation, which
+an explanation must not miss to compete with another, and which a beginning or an end must bring."""
 
 
-def parameter_cost(terms: Sequence[Term], parameters: int) -> float:
-    """What parameters and intervals cost; a term's second parameter costs more than its first."""
+def penalty_of(terms: Sequence[Term], parameters: int) -> float:
+    """What an explanation pays for its parameters, beginnings and ends.
+
+    A term's second parameter costs more than its first.
+
+    Args:
+        terms: The explanation.
+        parameters: Number of them that the recording can see.
+    """
     firsts = min(len(terms), parameters)
-    cost = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
-    return cost + sum(interval_cost(term) for term in terms)
+    paid = PENALTY_PER_PARAMETER * firsts + PENALTY_PER_FURTHER_PARAMETER * (parameters - firsts)
+    return paid + sum(interval_penalty(term) for term in terms)
 
 
 @dataclass(frozen=True)
@@ -46,7 +64,7 @@ class Alternative:
 
     Attributes:
         fit: Its fit.
-        behind: How far its penalised cost lies above the winner's.
+        behind: How far its penalised deviance lies above the winner's.
     """
 
     fit: Fit
@@ -91,7 +109,13 @@ class Naming:
     alone: Alone | None = None
 
 
-def no_terms(whitener: Whitener, searcher: Searcher) -> Fit:
+def empty_fit(whitener: Whitener, searcher: Searcher) -> Fit:
+    """The explanation without any effect: the station as commissioned.
+
+    Args:
+        whitener: The null in which it is seen.
+        searcher: The search.
+    """
     vector = whitener.of(searcher.bank.without)
     return Fit((), float(vector @ vector), vector, searcher.bank.without, np.zeros((0, 0)), 0)
 
@@ -102,33 +126,39 @@ def seen_in(whitener: Whitener, current: Fit) -> Fit:
     return replace(current, vector=vector, cost=float(vector @ vector))
 
 
-def total(candidate: Fit) -> float:
-    return candidate.cost + parameter_cost(candidate.terms, candidate.active)
+def penalised_cost(candidate: Fit) -> float:
+    """Cost of a fit in its null, and what it pays for parameters, beginnings and ends.
+
+    Args:
+        candidate: A fit.
+    """
+    return candidate.cost + penalty_of(candidate.terms, candidate.active)
 
 
-def evidence(candidate: Fit, whitener: Whitener) -> float:
-    """Minus twice the log-likelihood with the noise as the candidate itself leaves it, penalised.
+def penalised_deviance(candidate: Fit, whitener: Whitener) -> float:
+    """Deviance of a fit in a null, and what it pays for parameters, beginnings and ends.
 
     Unlike the cost in one null it compares explanations that are each judged in their own: what
     explains more leaves less noise, and pays less for the sum of its logarithms.
 
     Args:
         candidate: A fit.
-        whitener: The null in which it was made.
+        whitener: The null in which it was made; of what competes with others, the one that it
+            leaves itself.
     """
-    penalty = parameter_cost(candidate.terms, candidate.active)
+    penalty = penalty_of(candidate.terms, candidate.active)
     return whitener.deviance(candidate.simulated) + penalty
 
 
-def in_own_noise(searcher: Searcher, candidate: Fit, named: Fit | None = None) -> float:
-    """Evidence of a fit in the null that it leaves, where it is.
+def deviance_in_own_noise(searcher: Searcher, candidate: Fit, named: Fit | None = None) -> float:
+    """Penalised deviance of a fit in the null that it leaves, where it is.
 
     Args:
         searcher: The search.
         candidate: A fit in whatever null.
         named: Effects that are taken for granted, in a form that need not be exact.
     """
-    return evidence(candidate, searcher.whitener(candidate.simulated, named))
+    return penalised_deviance(candidate, searcher.whitener(candidate.simulated, named))
 
 
 @dataclass(frozen=True)
@@ -137,12 +167,13 @@ class Judged:
 
     Attributes:
         fit: The fit.
-        evidence: Minus twice the penalised log-likelihood.
+        penalised_deviance: Minus twice its log-likelihood there, parameters, beginnings and ends
+            paid for: the smaller, the better.
         null: Makes the null; few are asked for.
     """
 
     fit: Fit
-    evidence: float
+    penalised_deviance: float
     null: Callable[[], Whitener]
 
     @cached_property
@@ -176,7 +207,7 @@ def judged(
         )  # fmt: skip
         whitener = searcher.whitener(again.simulated, named)
         again = seen_in(whitener, again)
-        return again, evidence(again, whitener)
+        return again, penalised_deviance(again, whitener)
 
     how = (roughly, iterations)
     known = {

@@ -20,9 +20,9 @@ from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
     Judged,
-    evidence,
+    empty_fit,
     judged,
-    no_terms,
+    penalised_deviance,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit, fit
 from wind_sensors.diagnosis.explaining.onsets import ONSET_GAIN, ONSET_SHARE
@@ -72,13 +72,13 @@ def leader_of(
         current: The terms so far.
         ranked: Explanations with one more, best first.
     """
-    so_far = evidence(current, whitener)
+    so_far = penalised_deviance(current, whitener)
     enough: list[tuple[float, Judged]] = []
     nearly: list[tuple[float, Judged]] = []
     likeliest = np.inf
     for one in sorted(ranked, key=not_told):
         told = one.fit.terms[-1].is_told
-        if one.evidence > likeliest + CLEARLY_BETTER:
+        if one.penalised_deviance > likeliest + CLEARLY_BETTER:
             break
         brings = brought(searcher, one, current, so_far)
         newest = one.fit.terms[-1]
@@ -93,14 +93,14 @@ def leader_of(
             nearly.append((brings, one))
         if brings >= least:
             enough.append((brings, one))
-            likeliest = min(likeliest, one.evidence)
+            likeliest = min(likeliest, one.penalised_deviance)
     if not enough:
         return None if current.terms else _hardly_by_chance(searcher, whitener, current, nearly)
     enough = [
         pair
         for pair in enough
         if not _holds_always_as_well(
-            pair[1], enough, _as_well(current, so_far - pair[1].evidence)
+            pair[1], enough, _as_well(current, so_far - pair[1].penalised_deviance)
         )
     ]
     enough = explaining_what_stands_out(searcher, whitener, current, enough)
@@ -110,9 +110,10 @@ def leader_of(
         one
         for _, one in enough
         if one.fit.active < leader.fit.active
-        and one.evidence < leader.evidence + owed(leader.fit.terms[-1], one.fit.terms[-1])
+        and one.penalised_deviance
+        < leader.penalised_deviance + owed(leader.fit.terms[-1], one.fit.terms[-1])
     ]
-    return min(simpler, key=lambda one: one.evidence, default=leader)
+    return min(simpler, key=lambda one: one.penalised_deviance, default=leader)
 
 
 def _hardly_by_chance(
@@ -204,8 +205,8 @@ def leading_alone(searcher: Searcher, left: Fit, alone: Sequence[Term]) -> Fit:
     if left.terms[0].key == alone[0].key:
         return left
     whitener = searcher.whitener(searcher.bank.without)
-    nothing = no_terms(whitener, searcher)
-    so_far = evidence(nothing, whitener)
+    nothing = empty_fit(whitener, searcher)
+    so_far = penalised_deviance(nothing, whitener)
     first = fit(whitener, searcher.station, alone, searcher.bank.without)
     rivals = [
         (brought(searcher, one, nothing, so_far), one) for one in judged(searcher, [left, first])
@@ -235,7 +236,7 @@ def _holds_always_as_well(
     return any(
         other.fit.terms[-1].key == newest.key
         and other.fit.terms[-1].interval == ALWAYS
-        and other.evidence < one.evidence + near
+        and other.penalised_deviance < one.penalised_deviance + near
         for _, other in others
     )
 
@@ -275,16 +276,16 @@ def held_throughout(
         again = fit(one.whitener, searcher.station, terms, searcher.bank.without)
         always += judged(searcher, [again], named)
     allowed = -ONSET_GAIN if read else _as_well(named, gain)
-    before = named if named is not None else no_terms(one.whitener, searcher)
+    before = named if named is not None else empty_fit(one.whitener, searcher)
     as_well = [
         other
         for other in always
         if is_plausible(other.fit.terms[-1])
-        and other.evidence < one.evidence + allowed
+        and other.penalised_deviance < one.penalised_deviance + allowed
         and not calms_too_much(searcher, other, before)
         and not ruled_out(searcher.comparison, searcher.station, other.fit.terms)
     ]
-    return min(as_well, key=lambda other: other.evidence, default=one)
+    return min(as_well, key=lambda other: other.penalised_deviance, default=one)
 
 
 def not_told(one: Judged) -> bool:

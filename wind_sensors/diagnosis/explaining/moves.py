@@ -30,11 +30,11 @@ from wind_sensors.diagnosis.explaining.bounds import without_spare
 from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Judged,
-    evidence,
+    empty_fit,
     judged,
-    no_terms,
+    penalised_cost,
+    penalised_deviance,
     seen_in,
-    total,
 )
 from wind_sensors.diagnosis.explaining.fitting import (
     ROUGHLY,
@@ -104,8 +104,8 @@ def _around(terms: Sequence[Term]) -> list[tuple[Term, ...]]:
 def pruned(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     """The fit without terms that later ones made superfluous."""
     while len(current.terms) > 1:
-        best = min(_without_each(searcher, whitener, current), key=total)
-        if total(best) - total(current) > ACCEPTED_GAIN and all(
+        best = min(_without_each(searcher, whitener, current), key=penalised_cost)
+        if penalised_cost(best) - penalised_cost(current) > ACCEPTED_GAIN and all(
             large_enough(t) for t in current.terms
         ):
             break
@@ -138,20 +138,20 @@ def simplified(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
         whitener: The null.
         current: The explanation.
     """
-    nothing = no_terms(whitener, searcher)
+    nothing = empty_fit(whitener, searcher)
     while (
         (mends := _only_mends(searcher, whitener, current))
         or not all_plausible(current)
-        or too_small(searcher, current, total(nothing))
+        or too_small(searcher, current, penalised_cost(nothing))
     ):
         fewer = searcher.refit_all(whitener, _simpler(searcher, current.terms, mends))
         sound = [f for f in fewer if f.terms and all_plausible(f)]
         sound = sound or [f for f in fewer if f.terms]
         if not sound:
             return nothing
-        current = min(sound, key=total)
+        current = min(sound, key=penalised_cost)
         needed = min(needed_gain(nothing, term, searcher.baseline) for term in current.terms)
-        if total(nothing) - total(current) < needed:
+        if penalised_cost(nothing) - penalised_cost(current) < needed:
             return nothing
     return current
 
@@ -172,7 +172,7 @@ def spared(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:
     if terms == current.terms:
         return current
     fewer = fit(whitener, searcher.station, terms, searcher.bank.without)
-    return fewer if total(fewer) < total(current) else current
+    return fewer if penalised_cost(fewer) < penalised_cost(current) else current
 
 
 def _only_mends(
@@ -192,7 +192,7 @@ def _only_mends(
     if not small:
         return frozenset()
     fewer = _without_each(searcher, whitener, current)
-    missed = {term.key: total(f) for term, f in zip(current.terms, fewer, strict=True)}
+    missed = {term.key: penalised_cost(f) for term, f in zip(current.terms, fewer, strict=True)}
     most = max(cost for key, cost in missed.items() if key not in small)
     return frozenset(
         term.key
@@ -251,7 +251,7 @@ def merged(
     instruments = [t.instrument for t in current.terms]
     crowded = {name for name in instruments if instruments.count(name) > 1}
     crowded |= {STATION, PLATFORM}
-    nothing = no_terms(whitener, searcher)
+    nothing = empty_fit(whitener, searcher)
     known = {terms[0].key for terms in singles}
     more = [
         (starts[0],)
@@ -266,7 +266,7 @@ def merged(
         for interval in intervals
     }
     fits = searcher.refit_all(whitener, list(candidates.values()))
-    promising = sorted((f for f in fits if plausible(f)), key=total)[:MERGE_FINALISTS]
+    promising = sorted((f for f in fits if plausible(f)), key=penalised_cost)[:MERGE_FINALISTS]
     ranked = [r for r in judged(searcher, promising) if plausible(r.fit)]
     if not ranked:
         return current
@@ -280,7 +280,7 @@ def merged(
         times = max(times_beside(t) for t in further)
         form = whitener if times > 1.0 else searcher.whitener(alone.fit.simulated, alone.fit)
         margin = times * inexact(searcher, form, alone.fit, current)
-    if alone.evidence < evidence(current, whitener) + margin:
+    if alone.penalised_deviance < penalised_deviance(current, whitener) + margin:
         return alone.fit
     return current
 
@@ -304,7 +304,7 @@ def swapped(
         excluded: Names of effects that are not to be used.
     """
     losers: list[Judged] = []
-    leader = Judged(current, evidence(current, whitener), lambda: whitener)
+    leader = Judged(current, penalised_deviance(current, whitener), lambda: whitener)
     waiting = [term.key for term in current.terms]
     most = 2 * len(waiting)
     for key in waiting:  # grows while terms take the places of others
@@ -326,7 +326,7 @@ def swapped(
         rivals = [
             f for f in searcher.fit_all(whitener, without, candidates) if plausible(f)
         ]
-        nearest = sorted(rivals, key=total)[:SWAP_FINALISTS]
+        nearest = sorted(rivals, key=penalised_cost)[:SWAP_FINALISTS]
         ranked = [r for r in judged(searcher, nearest) if plausible(r.fit)]
         losers.extend(ranked)
         better = next(
@@ -365,14 +365,15 @@ def _brings_enough(searcher: Searcher, fewer: Fit, more: Fit) -> bool:
     """
     form = searcher.whitener(fewer.simulated, fewer)
     before, after = seen_in(form, fewer), seen_in(form, more)
-    candidate = Judged(after, evidence(after, form), lambda: form)
-    gain = brought(searcher, candidate, before, evidence(before, form))
+    candidate = Judged(after, penalised_deviance(after, form), lambda: form)
+    gain = brought(searcher, candidate, before, penalised_deviance(before, form))
     return gain >= inexactness(searcher, form, before, after)
 
 
 def _in_common(whitener: Whitener, rival: Judged, leader: Judged) -> float:
     """By how much an explanation is better than another in one null."""
-    return total(seen_in(whitener, leader.fit)) - total(seen_in(whitener, rival.fit))
+    leading, other = (seen_in(whitener, one.fit) for one in (leader, rival))
+    return penalised_cost(leading) - penalised_cost(other)
 
 
 def _behind(whitener: Whitener, rival: Judged, leader: Judged) -> float:
@@ -384,7 +385,7 @@ def _behind(whitener: Whitener, rival: Judged, leader: Judged) -> float:
         whitener: The common null.
         rival, leader: The two.
     """
-    own = rival.evidence - leader.evidence
+    own = rival.penalised_deviance - leader.penalised_deviance
     return own if own > 0.0 else max(own, -_in_common(whitener, rival, leader))
 
 
@@ -406,7 +407,7 @@ def _takes_over(
     needed = SWAP_GAIN - owed(replaced, rival.fit.terms[-1])
     if rival.fit.active > leader.fit.active:
         needed = max(needed, inexact(searcher, whitener, leader.fit, rival.fit))
-    own = leader.evidence - rival.evidence
+    own = leader.penalised_deviance - rival.penalised_deviance
     return min(own, _in_common(whitener, rival, leader)) > needed
 
 

@@ -12,11 +12,11 @@ from wind_sensors.diagnosis.explaining.explanation import (
     Alone,
     Alternative,
     Naming,
-    in_own_noise,
+    deviance_in_own_noise,
+    empty_fit,
     judged,
-    no_terms,
+    penalised_cost,
     seen_in,
-    total,
 )
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, covariance_of, fit
 from wind_sensors.diagnosis.explaining.leading import (
@@ -75,7 +75,7 @@ def name(
         if pair is not None:
             both = pruned(searcher, pair.whitener, pair.fit)
             if len(both.terms) > 1:
-                newest = [f.terms[0] for f in sorted(singles, key=total)[:CONTENDERS]]
+                newest = [f.terms[0] for f in sorted(singles, key=penalised_cost)[:CONTENDERS]]
                 settled = _settled(
                     searcher, *swapped(searcher, pair.whitener, both, newest), found.screened
                 )
@@ -148,7 +148,7 @@ def _greedy(
         beside: What was tried beside an effect already; grows.
     """
     report = progress or (lambda share: None)
-    nothing = no_terms(first.whitener, searcher)
+    nothing = empty_fit(first.whitener, searcher)
     screened = tuple(
         (s.effect, s.instrument, s.gain)
         for s in searcher.scores(first.whitener, nothing.vector)[:12]
@@ -231,7 +231,7 @@ def _behind(
     """
     if single.terms[0].key == first.terms[0].key:
         return tuple(losers)
-    ahead = in_own_noise(searcher, first) - in_own_noise(searcher, single)
+    ahead = deviance_in_own_noise(searcher, first) - deviance_in_own_noise(searcher, single)
     others = [Alternative(first, 0.0), *losers]
     return tuple(
         replace(a, behind=a.behind + ahead)
@@ -292,4 +292,4 @@ def _fits_better(searcher: Searcher, one: Naming, other: Naming) -> bool:
     first, second = judged(searcher, [one.fit, other.fit])
     wins = [t.key for t in first.fit.terms] == [t.key for t in one.fit.terms]
     margin = max(CLEARLY_BETTER, EQUAL_SHARE * other.gain)
-    return wins and first.evidence < second.evidence - margin
+    return wins and first.penalised_deviance < second.penalised_deviance - margin

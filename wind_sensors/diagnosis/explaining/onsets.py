@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.explaining.acceptance import plausible
-from wind_sensors.diagnosis.explaining.explanation import seen_in, total
+from wind_sensors.diagnosis.explaining.explanation import penalised_cost, seen_in
 from wind_sensors.diagnosis.explaining.fitting import Fit, cost_of, fit
 from wind_sensors.diagnosis.explaining.intervals import (
     NEAR_AN_END,
@@ -219,7 +219,7 @@ def refined_interval(searcher: Searcher, whitener: Whitener, candidate: Fit) -> 
         trial = fit(
             whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2
         )
-        if total(trial) < total(best):
+        if penalised_cost(trial) < penalised_cost(best):
             best, always = trial, None
     if moves_a_clock(best):
         best = _at_the_jump(searcher, whitener, best, proposed - {ALWAYS})
@@ -295,7 +295,7 @@ def _by_trial(searcher: Searcher, whitener: Whitener, candidate: Fit) -> Fit:
     trial = fit(
         whitener, searcher.station, [*fixed, moved], searcher.bank.without, iterations=2
     )
-    return trial if total(trial) < total(candidate) else candidate
+    return trial if penalised_cost(trial) < penalised_cost(candidate) else candidate
 
 
 def _at_the_jump(
@@ -336,7 +336,7 @@ def _at_the_jump(
         return candidate
     moved = [*fixed, replace(last, interval=best)]
     trial = fit(whitener, searcher.station, moved, searcher.bank.without, iterations=2)
-    return trial if total(trial) < total(candidate) else candidate
+    return trial if penalised_cost(trial) < penalised_cost(candidate) else candidate
 
 
 def _best_window(
@@ -444,6 +444,6 @@ def _passing(searcher: Searcher, current: Fit, term: Term) -> Fit | None:
     trial = fit(whitener, searcher.station, [*others, passing], searcher.bank.without)
     trial = refined_interval(searcher, whitener, trial)
     always = fit(whitener, searcher.station, current.terms, searcher.bank.without, known=current)
-    if total(trial) < total(always) - least and plausible(trial):
+    if penalised_cost(trial) < penalised_cost(always) - least and plausible(trial):
         return trial
     return None

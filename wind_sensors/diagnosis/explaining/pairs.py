@@ -25,11 +25,11 @@ from wind_sensors.diagnosis.explaining.explanation import (
     CLEARLY_BETTER,
     EQUAL_SHARE,
     Judged,
+    empty_fit,
     judged,
-    no_terms,
-    parameter_cost,
+    penalised_cost,
+    penalty_of,
     seen_in,
-    total,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.search import Searcher
@@ -82,12 +82,13 @@ def better_pair(
     if not ranked:
         return None
     best = ranked[0]
-    nothing = no_terms(leader.whitener, searcher)
-    margin = max(CLEARLY_BETTER, EQUAL_SHARE * (total(nothing) - total(leader.fit)))
+    nothing = empty_fit(leader.whitener, searcher)
+    gained = penalised_cost(nothing) - penalised_cost(leader.fit)
+    margin = max(CLEARLY_BETTER, EQUAL_SHARE * gained)
     if best.fit.active > leader.fit.active:
         own = inexact(searcher, leader.whitener, leader.fit, best.fit)
         margin = max(ACCEPTED_FURTHER_GAIN, own, margin)
-    return best if best.evidence < leader.evidence - margin else None
+    return best if best.penalised_deviance < leader.penalised_deviance - margin else None
 
 
 def built_on_simple(
@@ -107,16 +108,16 @@ def built_on_simple(
     if len(current.terms) > 1 or current.active < SEVERAL:
         return []
     leading = current.terms[0].key
-    nothing = total(no_terms(whitener, searcher))
-    led = nothing - total(seen_in(whitener, current))
+    nothing = penalised_cost(empty_fit(whitener, searcher))
+    led = nothing - penalised_cost(seen_in(whitener, current))
     simple = [
         f
-        for f in sorted(singles, key=total)
+        for f in sorted(singles, key=penalised_cost)
         if f.active == 1
         and f.terms[0].interval == ALWAYS
         and f.terms[0].key != leading
         and plausible(f)
-        and nothing - total(f) > SIMPLE_SHARE * led
+        and nothing - penalised_cost(f) > SIMPLE_SHARE * led
     ]
     found: list[list[Term]] = []
     for first in simple[:BUILT_PAIRS]:
@@ -131,7 +132,7 @@ def built_on_simple(
         ]
         beside = [f for f in searcher.fit_all(null, base, candidates) if plausible(f)]
         if beside:
-            found.append(list(min(beside, key=total).terms))
+            found.append(list(min(beside, key=penalised_cost).terms))
     return found
 
 
@@ -156,21 +157,21 @@ def promising_pairs(
         if one.terms[0].interval != ALWAYS:
             continue
         key = one.terms[0].key
-        if key not in best or total(one) < total(best[key]):
+        if key not in best or penalised_cost(one) < penalised_cost(best[key]):
             best[key] = one
     kept = list(best.values())
     explained = [*(one.simulated for one in kept), current.simulated]
     changes = nothing - np.array([whitener.of(simulated) for simulated in explained])
     gram, seen = changes @ changes.T, changes @ nothing
     led, _ = promise(gram, seen, [len(kept)])
-    promised = led - parameter_cost(current.terms, current.active)
+    promised = led - penalty_of(current.terms, current.active)
     found: list[tuple[float, list[Term]]] = []
     for i, j in itertools.combinations(range(len(kept)), 2):
         terms = [kept[i].terms[0], kept[j].terms[0]]
         if not may_join(terms[1], terms[:1]):
             continue
         gain, sizes = promise(gram, seen, [i, j])
-        gain -= parameter_cost(terms, kept[i].active + kept[j].active)
+        gain -= penalty_of(terms, kept[i].active + kept[j].active)
         if gain > promised + CLEARLY_BETTER:
             found.append((gain, [_scaled(t, float(s)) for t, s in zip(terms, sizes, strict=True)]))
             if any(t.effect.smooths for t in terms):

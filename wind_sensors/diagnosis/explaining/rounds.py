@@ -19,11 +19,11 @@ from wind_sensors.diagnosis.explaining.beside import Beside
 from wind_sensors.diagnosis.explaining.explanation import (
     Alternative,
     Judged,
-    evidence,
-    in_own_noise,
+    deviance_in_own_noise,
+    empty_fit,
     judged,
-    no_terms,
-    total,
+    penalised_cost,
+    penalised_deviance,
 )
 from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.guesses import BLIND_IN_PARTS
@@ -96,7 +96,7 @@ def best_single(
         excluded: Names of effects that are not to be used.
     """
     allowed = [f for f in singles if f.terms[0].effect.name not in excluded]
-    return _one_more(searcher, whitener, no_terms(whitener, searcher), allowed, None)
+    return _one_more(searcher, whitener, empty_fit(whitener, searcher), allowed, None)
 
 
 def best_beside(
@@ -126,7 +126,8 @@ def _one_more(
         fits: With one more each.
         named: The terms so far; None: there are none.
     """
-    sound = [f for f in fits if plausible(f) and not too_small(searcher, f, total(current))]
+    so_far = penalised_cost(current)
+    sound = [f for f in fits if plausible(f) and not too_small(searcher, f, so_far)]
     pool = _finalists(searcher, whitener, current, sound, named)
     if not pool:
         return None
@@ -139,11 +140,12 @@ def _one_more(
     best = leader_of(searcher, whitener, current, ranked)
     if best is None:
         return None
-    leader = held_throughout(
-        searcher, best, named, evidence(current, whitener) - best.evidence, ranked
-    )
+    gain = penalised_deviance(current, whitener) - best.penalised_deviance
+    leader = held_throughout(searcher, best, named, gain, ranked)
     losers = tuple(
-        Alternative(r.fit, r.evidence - leader.evidence) for r in ranked if r is not best
+        Alternative(r.fit, r.penalised_deviance - leader.penalised_deviance)
+        for r in ranked
+        if r is not best
     )
     return leader, losers
 
@@ -180,11 +182,11 @@ def _finalists(
         named: The terms so far; None: there are none.
     """
     found: dict[int, Fit] = {k: f for k, f in enumerate(fits) if f.terms[-1].is_told}
-    own = in_parallel(lambda f: in_own_noise(searcher, f, named), fits, searcher.workers)
+    own = in_parallel(lambda f: deviance_in_own_noise(searcher, f, named), fits, searcher.workers)
     worth = False
     for costs, so_far in (
-        ([total(f) for f in fits], total(current)),
-        (own, evidence(current, whitener)),
+        ([penalised_cost(f) for f in fits], penalised_cost(current)),
+        (own, penalised_deviance(current, whitener)),
     ):
         order = np.argsort(costs, kind="stable")[:FINALISTS]
         best = min(costs, default=so_far)
@@ -223,7 +225,7 @@ def _where_they_calm(
                 found += [
                     again
                     for again in judged(searcher, [part], named)
-                    if again.evidence <= one.evidence
+                    if again.penalised_deviance <= one.penalised_deviance
                 ]
     return found
 
@@ -259,12 +261,12 @@ def _with_sharp_intervals(
         starts = [*blind_starts(searcher, sharp), *later_starts(sharp, lasting)]
         others += searcher.fit_all(null, named, starts)
     sound = judged(searcher, [f for f in others if plausible(f)], named)
-    if sound and sound[0].evidence < sharp[0].evidence:
+    if sound and sound[0].penalised_deviance < sharp[0].penalised_deviance:
         # The interval is that of another effect so far.
         sound += judged(searcher, [sharper(sound[0])], named)
     growing = searcher.refit_all(null, _growing([*sharp, *sound]))
     sound += judged(searcher, [f for f in growing if plausible(f)], named)
-    return sorted([*lasting, *sharp, *sound], key=lambda r: r.evidence)
+    return sorted([*lasting, *sharp, *sound], key=lambda r: r.penalised_deviance)
 
 
 def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
@@ -318,12 +320,13 @@ def later_starts(passing: Sequence[Judged], lasting: Sequence[Judged]) -> list[l
         lasting: Those whose last effect always holds.
     """
     begin, end = passing[0].fit.terms[-1].interval
-    if begin <= 0.0 or any(one.evidence < passing[0].evidence for one in lasting):
+    least = passing[0].penalised_deviance
+    if begin <= 0.0 or any(one.penalised_deviance < least for one in lasting):
         return []
     known = {(one.fit.terms[-1].key, one.fit.terms[-1].interval) for one in passing}
     wide = [
         one.fit.terms[-1]
-        for one in sorted(lasting, key=lambda one: one.evidence)
+        for one in sorted(lasting, key=lambda one: one.penalised_deviance)
         if one.fit.terms[-1].instrument in (STATION, PLATFORM)
         and not one.fit.terms[-1].effect.legible
     ]

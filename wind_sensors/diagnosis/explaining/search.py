@@ -86,8 +86,8 @@ JUDGEMENTS = 32
 each judgement one."""
 
 
-def interval_cost(term: Term) -> float:
-    """What a term's beginning and end cost; nought where the signals tell them."""
+def interval_penalty(term: Term) -> float:
+    """What a term pays for its beginning and end; nought where the signals tell them."""
     if term.interval == ALWAYS or term.effect.legible:
         return 0.0
     begin, end = term.interval
@@ -106,7 +106,7 @@ class Searcher:
         misplaced: What the error of the reference's place changes, one standard deviation a row.
         effects: The catalogue.
         workers: Processes.
-        judgements: Fits made again in the nulls that they leave, and their evidence.
+        judgements: Fits made again in the nulls that they leave, and their penalised deviance.
     """
 
     comparison: Comparison
@@ -308,12 +308,12 @@ class Searcher:
             ahead = min(
                 fits,
                 key=lambda f: (
-                    interval_cost(f.terms[-1])
+                    interval_penalty(f.terms[-1])
                     + self.whitener(f.simulated).deviance(f.simulated)
                 ),
             )
         elif len(fits) > 1:
-            ahead = min(fits, key=lambda f: f.cost + interval_cost(f.terms[-1]))
+            ahead = min(fits, key=lambda f: f.cost + interval_penalty(f.terms[-1]))
         found = fit(
             whitener, self.station, ahead.terms, rest, LAST_ITERATIONS, ahead, ROUGHLY
         )

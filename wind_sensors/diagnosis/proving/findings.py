@@ -41,7 +41,7 @@ TOGETHER_WITH_MORE = 1.0
 24 on concealed data none was the truth."""
 
 LARGEST_EQUAL = 60.0
-"""Explanations are never equal if their penalised costs differ by more."""
+"""Explanations are never equal if their penalised deviances differ by more."""
 
 
 @dataclass(frozen=True)

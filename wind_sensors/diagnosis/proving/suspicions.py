@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.effects.definition import STATION, Effect, entry_of,
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
-from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, interval_cost
+from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, interval_penalty
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
@@ -195,5 +195,5 @@ def _price(whitener: Whitener, explanation: Fit) -> float:
     """Cost of an explanation, its parameters, beginnings and ends paid for."""
     left = whitener.of(explanation.simulated)
     parameters = sum(len(t.effect.parameters) for t in explanation.terms)
-    edges = sum(interval_cost(t) for t in explanation.terms)
+    edges = sum(interval_penalty(t) for t in explanation.terms)
     return float(left @ left) + PENALTY_PER_PARAMETER * parameters + edges
