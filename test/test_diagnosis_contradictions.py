@@ -37,7 +37,8 @@ from wind_sensors.diagnosis.proving.contradictions import (
     is_otherwise_in_eddies,
     varies,
 )
-from wind_sensors.diagnosis.proving.decision import Remainder, Verdict, verdict_of
+from wind_sensors.diagnosis.proving.remainder import Remainder
+from wind_sensors.diagnosis.proving.rules import Case, Verdict, first_look
 from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.station.signals import Angles, Pulses
 
@@ -192,7 +193,7 @@ def test_a_series_of_harmonics_must_leave_nothing(effect: str, p: float, verdict
     one = fit(null, STATION, [term], searcher.bank.without, iterations=0)
     naming = Naming(one, null, null, null.of(searcher.bank.without), 2000.0)
     little = Remainder(score=1.1, p=p, share=0.005)
-    assert verdict_of(naming, [], little, {}, 0.002, Excess()) == verdict
+    assert first_look(Case(naming, [], little, {}, 0.002, Excess())) == verdict
 
 
 CERTAIN = (("calibration_drift", "cup"), ("vane_offset", "vane"))
@@ -219,7 +220,7 @@ def test_two_effects_each_in_its_own_form_may_leave_more_than_one(
     fitted = fit(null, STATION, terms, searcher.bank.without, iterations=0)
     naming = Naming(fitted, null, null, null.of(searcher.bank.without), 2000.0)
     left = Remainder(score=1.5, p=0.002, share=share)
-    assert verdict_of(naming, [], left, {}, 0.002, Excess()) == verdict
+    assert first_look(Case(naming, [], left, {}, 0.002, Excess())) == verdict
 
 
 @pytest.mark.parametrize("made_good", [False, True])

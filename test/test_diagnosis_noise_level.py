@@ -18,7 +18,7 @@ from wind_sensors.diagnosis.healthy.noise_level import (
     learnt_levels,
     levels,
 )
-from wind_sensors.diagnosis.proving.decision import NOISY
+from wind_sensors.diagnosis.proving.remainder import NOISY
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Input, Reference, Station

@@ -70,8 +70,7 @@ def test_a_vane_that_says_nothing_is_not_well() -> None:
     (silent,) = found.silent
     assert (silent.instrument, silent.topic) == ("vane", "/vane/joint_states")
     said = "vane: no readings at all on /vane/joint_states, so nothing can be said of it"
-    assert said in found.unexplained.description
-    assert said not in found.left_over
+    assert said not in found.unexplained.description
     content = as_json(found)
     assert content["silent"][0]["instrument"] == "vane"
     assert said in content["unexplained"]["description"]
@@ -125,6 +124,8 @@ def test_other_diagnoses_tell_of_what_says_nothing() -> None:
     assert with_silent(well, ()) is well
     told = with_silent(well, silent_instruments(without_vane(), STATION))
     assert told.verdict == "unknown"
+    assert told.unexplained.description == ""
+    assert outcome_json(told)["unexplained"]["description"] == told.silent[0].words
     assert outcome_json(told)["silent"][0]["instrument"] == "vane"
     assert "<h1>Vane says nothing at all</h1>" in outcome_page(told)
     assert "<b>Silent:</b> vane: no readings at all" in outcome_page(told)

@@ -15,7 +15,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import Term
-from wind_sensors.diagnosis.proving.decision import (
+from wind_sensors.diagnosis.proving.remainder import (
     REMAINDER_SCORE,
     REMAINDER_SCORES,
     STIRRED_TIMES,

@@ -143,7 +143,7 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
             "held out: share of the excess misfit removed on data that were not fitted, with its "
             "95 % interval"
         )
-    if diagnosis.left_over:
-        console.print(f"left over: {diagnosis.left_over}")
+    if diagnosis.unexplained.description:
+        console.print(f"left over: {diagnosis.unexplained.description}")
     if not diagnosis.calibrated:
         console.print("null not calibrated: give --healthy recordings of the same station")

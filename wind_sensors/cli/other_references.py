@@ -125,8 +125,8 @@ def print_outcome(console: Console, outcome: Outcome) -> None:
                 "held-out blocks",
                 highlight=False,
             )
-    if outcome.unexplained.description:
-        console.print(f"left over: {outcome.unexplained.description}")
+    if outcome.left_over:
+        console.print(f"left over: {outcome.left_over}")
     for note in outcome.declined:
         console.print(f"not claimed: {note}")
     if not outcome.calibrated:

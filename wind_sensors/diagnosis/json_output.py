@@ -11,7 +11,7 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.verdict import Diagnosis
-from wind_sensors.station.silence import Silent
+from wind_sensors.station.silence import Silent, told_first
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -27,7 +27,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "unexplained": {
             "p": round(diagnosis.unexplained.p, 4),
             "share": round(diagnosis.unexplained.share, 4),
-            "description": diagnosis.unexplained.description,
+            "description": told_first(diagnosis.silent, diagnosis.unexplained.description),
             "regions": [
                 {
                     "channel": f.region.channel, "kind": f.region.kind, "label": f.region.label,

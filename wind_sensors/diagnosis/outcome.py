@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
 from wind_sensors.diagnosis.json_output import finding_json, silent_json
-from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
+from wind_sensors.diagnosis.proving.rules import Verdict, with_silence
 from wind_sensors.station.model import Station
-from wind_sensors.station.silence import Silent
+from wind_sensors.station.silence import Silent, told_first
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Outcome:
         verdict: In one word.
         calibrated: Whether healthy recordings stand behind the null.
         findings: Named effects; of an ambiguous set, all members.
-        unexplained: What is left.
+        unexplained: What is left of what speaks.
         smallest_detectable: By effect and instrument: the least size that would have shown.
         station: The station with the named physics.
         length: Of the recording [s].
@@ -75,22 +75,10 @@ class Outcome:
     healthy: tuple[str, ...] = ()
     silent: tuple[Silent, ...] = ()
 
-
-def verdict_of(findings: tuple[Finding, ...], unexplained: Unexplained, limit: float) -> Verdict:
-    """The word for findings and a remainder.
-
-    Args:
-        findings: All of them.
-        unexplained: What is left.
-        limit: Share of the misfit above which a remainder counts.
-    """
-    if any(f.set_number == 0 for f in findings):
-        return "named"
-    if findings:
-        return "ambiguous"
-    if unexplained.p < 0.01 and unexplained.share > limit:
-        return "unknown"
-    return "none"
+    @property
+    def left_over(self) -> str:
+        """What says nothing, and what is left of the rest, for people."""
+        return told_first(self.silent, self.unexplained.description)
 
 
 def with_silent(outcome: Outcome, silent: Sequence[Silent]) -> Outcome:
@@ -102,13 +90,8 @@ def with_silent(outcome: Outcome, silent: Sequence[Silent]) -> Outcome:
     """
     if not silent:
         return outcome
-    said = (*(each.words for each in silent), outcome.unexplained.description)
-    description = "; ".join(part for part in said if part)
     return replace(
-        outcome,
-        verdict="unknown" if outcome.verdict == "none" else outcome.verdict,
-        unexplained=replace(outcome.unexplained, description=description),
-        silent=tuple(silent),
+        outcome, verdict=with_silence(outcome.verdict, silent), silent=tuple(silent)
     )
 
 
@@ -123,7 +106,7 @@ def outcome_json(outcome: Outcome) -> dict[str, Any]:
         "unexplained": {
             "p": round(outcome.unexplained.p, 4),
             "share": round(outcome.unexplained.share, 4),
-            "description": outcome.unexplained.description,
+            "description": outcome.left_over,
         },
         "silent": silent_json(outcome.silent),
         "declined": list(outcome.declined),

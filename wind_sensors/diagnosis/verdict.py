@@ -30,9 +30,9 @@ from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
-from wind_sensors.diagnosis.proving.decision import Verdict
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained, equal_explanations
 from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of, with_suspicion
+from wind_sensors.diagnosis.proving.rules import Verdict, with_silence
 from wind_sensors.diagnosis.regions import Found, RegionBank
 from wind_sensors.station.model import Angle, Rotor, Station
 from wind_sensors.station.signals import Recording
@@ -56,7 +56,7 @@ class Diagnosis:
         verdict: In one word.
         calibrated: Whether healthy recordings stand behind the null.
         findings: Named effects; of an ambiguous set, all members.
-        unexplained: What is left.
+        unexplained: What is left of what speaks, and why no name is given.
         smallest_detectable: By effect: the least size that would have been told from nought.
         station: The station with the named physics.
         baseline: What was normal.
@@ -81,12 +81,6 @@ class Diagnosis:
     objection: str = ""
     bank: RegionBank | None = field(default=None, repr=False)
     silent: tuple[Silent, ...] = ()
-
-    @property
-    def left_over(self) -> str:
-        """What is left, and why no name is given, without what is said of silent instruments."""
-        silent = "; ".join(each.words for each in self.silent)
-        return self.unexplained.description.removeprefix(silent).removeprefix("; ")
 
 
 def _explained(
@@ -285,15 +279,13 @@ def diagnose(
     station = planted(_to_plant_on(baseline, named), named)
     remainder = judged.remainder
     silent = silent_instruments(recording, baseline.station)
-    told = (*(each.words for each in silent), judged.words(baseline))
     return Diagnosis(
         recording=recording.name,
-        # Nobody knows that all is well with what says nothing.
-        verdict="unknown" if silent and judged.verdict == "none" else judged.verdict,
+        verdict=with_silence(judged.verdict, silent),
         calibrated=baseline.calibrated,
         findings=judged.findings,
         unexplained=Unexplained(
-            remainder.p, remainder.share, judged.regions, "; ".join(part for part in told if part)
+            remainder.p, remainder.share, judged.regions, judged.words(baseline)
         ),
         smallest_detectable={name: each.size for name, each in judged.detectable.items()},
         station=station,

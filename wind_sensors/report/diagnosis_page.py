@@ -12,9 +12,9 @@ import numpy as np
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
-from wind_sensors.diagnosis.proving.decision import REMAINDER_P, REMAINDER_SCORES
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.diagnosis.proving.proof import Proof
+from wind_sensors.diagnosis.proving.remainder import REMAINDER_P, REMAINDER_SCORES
 from wind_sensors.diagnosis.regions import OF_POWER, Found, Region
 from wind_sensors.diagnosis.verdict import Diagnosis
 from wind_sensors.report.cuts import CUTS_STYLE, in_both_cuts
@@ -83,9 +83,8 @@ def silent_paragraphs(silent: Sequence[Silent]) -> str:
 
 def _left_over(diagnosis: Diagnosis) -> list[str]:
     """Why no name is given."""
-    if diagnosis.verdict not in {"unknown", "inconclusive"} or not diagnosis.left_over:
-        return []
-    return [diagnosis.left_over]
+    left = diagnosis.unexplained.description
+    return [left] if left and diagnosis.verdict in {"unknown", "inconclusive"} else []
 
 
 def _summary(diagnosis: Diagnosis) -> str:

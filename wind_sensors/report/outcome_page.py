@@ -125,7 +125,7 @@ def outcome_page(outcome: Outcome) -> str:
         if outcome.calibrated
         else "The null is not calibrated: no healthy recording was given."
     )
-    left = outcome.unexplained.description or "Nothing that matters."
+    left = outcome.left_over or "Nothing that matters."
     detectable = tuple(
         f"{words(name)}: {smallest_text(size)}"
         for name, size in sorted(outcome.smallest_detectable.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,16 @@ class Silent:
             f"{self.instrument}: no {self.signal} at all on {self.topic}, so nothing can be said "
             "of it: look at its cable, its driver, the topic"
         )
+
+
+def told_first(silent: Sequence[Silent], words: str) -> str:
+    """What is said of instruments that say nothing, and then of the others, for people.
+
+    Args:
+        silent: The former; may be none.
+        words: Of the latter; may be empty.
+    """
+    return "; ".join(part for part in (*(each.words for each in silent), words) if part)
 
 
 def tells(readings: Angles | None) -> bool:

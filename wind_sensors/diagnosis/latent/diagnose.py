@@ -28,8 +28,9 @@ from wind_sensors.diagnosis.means.findings import last_set, too_small
 from wind_sensors.diagnosis.means.fits import fit, held_out, intervals
 from wind_sensors.diagnosis.means.proofs import proof_of, share_removed
 from wind_sensors.diagnosis.means.search import Explained, Named, needed_t, search, t_of
-from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
+from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
+from wind_sensors.diagnosis.proving.rules import verdict_on_findings
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import compass_from_yaw, heading_of
@@ -109,7 +110,7 @@ def diagnose_latent(
     )  # fmt: skip
     findings = _findings(felt, bench, explained)
     declined = _declined(bench, station, explained)
-    verdict = verdict_of(findings, Unexplained(1.0, 0.0, (), ""), 1.0)
+    verdict = verdict_on_findings(findings, Unexplained(1.0, 0.0, (), ""), 1.0)
     if verdict == "none" and turning < FEWEST_TURNING:
         verdict = "inconclusive"
     to_plant, notes = _with_whole_motion(bench, explained, findings)

@@ -41,8 +41,9 @@ from wind_sensors.diagnosis.means.vanes import (
     vane_effects,
     vane_standing,
 )
-from wind_sensors.diagnosis.outcome import Outcome, Panel, verdict_of
+from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained
+from wind_sensors.diagnosis.proving.rules import verdict_on_findings
 from wind_sensors.errors import UserError
 from wind_sensors.station.signals import Recording, Series
 
@@ -126,7 +127,7 @@ def diagnose_means(
     left = max((NOTHING_LEFT, *(each.left for each in told)), key=lambda u: u.share)
     return Outcome(
         recording=recording.name,
-        verdict=verdict_of(tuple(findings), left, REMAINDER_SHARE),
+        verdict=verdict_on_findings(tuple(findings), left, REMAINDER_SHARE),
         calibrated=healthy is not None,
         findings=tuple(findings),
         unexplained=left,

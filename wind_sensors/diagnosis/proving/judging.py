@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.detectable import Detectable, smallest_detectable
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import window_of
@@ -16,55 +15,42 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import (
     is_too_calm,
-    need_calibration,
     too_calm,
 )
 from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess_of
-from wind_sensors.diagnosis.proving.contradictions import (
-    comes_in_bursts,
-    false_in_bursts,
-    goes_with_speed,
-    is_discordant,
-    is_otherwise_in_eddies,
-    undo_each_other,
-    varies,
-)
-from wind_sensors.diagnosis.proving.decision import (
-    REMAINDER_P,
-    Remainder,
-    Verdict,
-    is_noisy,
-    located,
-    remainder_of,
-    unstirred,
-    verdict_of,
-    with_own_noise,
-)
+from wind_sensors.diagnosis.proving.contradictions import false_in_bursts
 from wind_sensors.diagnosis.proving.findings import (
     Finding,
     equal_explanations,
     findings_of,
 )
-from wind_sensors.diagnosis.proving.mere_shift import is_a_mere_shift
-from wind_sensors.diagnosis.proving.support import (
-    UNSEEN_NOISY_GAIN,
-    borne_out,
-    determined,
-    made_up,
-    passes_unseen,
-    stands_out,
+from wind_sensors.diagnosis.proving.remainder import (
+    REMAINDER_P,
+    Remainder,
+    is_noisy,
+    located,
+    remainder_of,
+    unstirred,
+    with_own_noise,
 )
-from wind_sensors.diagnosis.proving.suspicions import suspicion_beside, suspicion_of
+from wind_sensors.diagnosis.proving.rules import (
+    CLAIMS,
+    IN_BURSTS,
+    REPEATED,
+    Case,
+    Claim,
+    Objection,
+    Verdict,
+    first_look,
+    objection_to,
+    of_the_recording,
+)
+from wind_sensors.diagnosis.proving.suspicions import suspicion_beside
 from wind_sensors.diagnosis.regions import OF_POWER, Found, RegionBank, region_bank, strongest
 from wind_sensors.station.model import Station
 
 LEAST_JUDGED = 0.1
 """Share of the record that what passes must hold for its minutes' noise to be judged."""
-
-REPEATED = 0.01
-"""With more of the reference's samples repeating those before them, something is wrong with it."""
-
-IN_BURSTS = "come in bursts, as a radio's or a motor's do: a contact bounces by chance"
 
 
 @dataclass(frozen=True)
@@ -101,7 +87,7 @@ class Judgement:
     @property
     def is_claim(self) -> bool:
         """Whether something is named."""
-        return self.verdict in {"named", "ambiguous"}
+        return self.verdict in CLAIMS
 
     def words(self, baseline: Baseline) -> str:
         """What is left, and why no name is given, for people.
@@ -113,11 +99,12 @@ class Judgement:
         repeated = self.naming.whitener.comparison.repeated
         if (self.verdict == "unknown" and repeated <= REPEATED) or self.remainder.p < REMAINDER_P:
             description = _description(self.regions[0])
-        if self.verdict == "unknown" and is_noisy(self.naming, self.excess):
-            description = f"{description}; {described(self.excess)}"
         if self.calm and self.verdict == "inconclusive":
             description = too_calm(baseline)
-        said = [description, self.objection]
+        said = [description]
+        if self.verdict == "unknown" and is_noisy(self.naming, self.excess):
+            said.append(described(self.excess))
+        said.append(self.objection)
         if repeated > REPEATED:
             said.append(
                 f"the reference repeats its last wind in {100.0 * repeated:.0f} % of its samples, "
@@ -157,30 +144,28 @@ def judgement_of(
     equal = equal_explanations(naming)
     located_p = bank.p_value(max(f.score for f in before))
     excess = _noise_left(naming, baseline)
-    verdict = verdict_of(naming, equal, remainder, detectable, located_p, excess)
     calm = is_too_calm(comparison, baseline)
-    if calm and verdict != "none" and need_calibration(naming.fit.terms):
-        verdict = "inconclusive"
+    case = Case(naming, equal, remainder, detectable, located_p, excess, calm)
+    verdict = first_look(case)
     report("proving")(0.2)
     findings = findings_of(
         naming, equal, before, bank, baseline, with_proof, workers
-    ) if verdict in {"named", "ambiguous"} else ()  # fmt: skip
+    ) if verdict in CLAIMS else ()  # fmt: skip
     report("proving")(1.0)
-    structured = located(naming, bank, comparison, baseline).is_structure
-    upheld = _upheld(
-        verdict, findings, naming, comparison, baseline.station, structured, workers
-    )
-    verdict = upheld.verdict
-    if verdict == "none" and comparison.repeated > REPEATED:
-        # The instruments are well, but the recording is not.
-        verdict = "unknown"
-    if calm and verdict == "unknown":
-        verdict = "inconclusive"
+    objection = None
+    if findings:
+        structured = located(naming, bank, comparison, baseline).is_structure
+        objection = objection_to(
+            Claim(verdict, findings, naming, comparison, baseline.station, structured, workers)
+        )
+    if objection is not None:
+        verdict, findings = objection.leaves, ()
+    verdict = of_the_recording(verdict, comparison.repeated, calm)
     return Judgement(
         naming=naming,
         verdict=verdict,
-        findings=upheld.findings,
-        objection=upheld.objection,
+        findings=findings,
+        objection="" if objection is None else _in_words(naming.fit.terms, objection),
         remainder=remainder,
         excess=excess,
         calm=calm,
@@ -188,7 +173,7 @@ def judgement_of(
         bank=bank,
         regions_before=tuple(before),
         regions=tuple(_structured(before) if verdict == "unknown" else after),
-        contradicted=upheld.contradicted,
+        contradicted=objection is not None and objection.contradicts,
     )
 
 
@@ -232,80 +217,9 @@ def _noise_left(naming: Naming, baseline: Baseline) -> Excess:
     return max(found, key=lambda excess: excess.score)
 
 
-@dataclass(frozen=True)
-class _Upheld:
-    """What stands of a verdict, and what speaks against it, for people.
-
-    Attributes:
-        verdict, findings, objection: As in a judgement.
-        contradicted: As there.
-    """
-
-    verdict: Verdict
-    findings: tuple[Finding, ...] = ()
-    objection: str = ""
-    contradicted: bool = False
-
-
-def _upheld(
-    verdict: Verdict,
-    findings: tuple[Finding, ...],
-    naming: Naming,
-    comparison: Comparison,
-    station: Station,
-    structured: bool,
-    workers: int,
-) -> _Upheld:
-    """Verdict and findings after what speaks against them.
-
-    What was only said of a part of the record, brought little and is withdrawn, leaves nothing if
-    the recording shows no more than healthy ones do: of the many intervals some fit the swings of a
-    healthy vane.
-    """
-    if not findings:
-        return _Upheld(verdict)
-    names = " and ".join(_names(naming.fit.terms))
-    passing = any(t.interval != ALWAYS for t in naming.fit.terms)
-    something = structured or not passing or naming.gain > UNSEEN_NOISY_GAIN
-    left: Verdict = "unknown" if something else "none"
-    contradiction = ""
-    if not borne_out(findings):
-        left = left if stands_out(findings) else "none"
-        objection = "blocks that were not fitted do not bear it out"
-    elif passes_unseen(findings):
-        left = left if stands_out(findings) else "none"
-        objection = "only for a part of the record, where nothing stands out"
-    elif made_up(findings, comparison, naming.gain):
-        objection = "the data do not show the one without the other"
-    elif undo_each_other(naming, station):
-        objection = "each would have to undo what the other does"
-    elif varies(naming, station):
-        objection = contradiction = "with another size in parts of the record"
-    elif (suspicion := suspicion_of(naming, station, workers)) is not None:
-        left, objection = "unknown", suspicion.words
-    elif contradiction := _contradiction(naming, station):
-        objection = contradiction
-    elif verdict == "named" and is_a_mere_shift(naming, station):
-        left = "unknown"
-        objection = "a constant would, too: the wind does not show that it goes with the direction"
-    elif not determined(findings):
-        objection = "of any size, nought among them"
-    else:
-        return _Upheld(verdict, findings)
-    return _Upheld(left, (), f"{names} would fit, but {objection}", bool(contradiction))
-
-
-def _contradiction(naming: Naming, station: Station) -> str:
-    """How the signals contradict the form of what is named; empty: they do not."""
-    if comes_in_bursts(naming):
-        return f"they {IN_BURSTS}"
-    if goes_with_speed(naming, station):
-        return "with another size in strong wind than in weak wind"
-    if is_discordant(naming, station):
-        return "with another size on one signal than on another"
-    if is_otherwise_in_eddies(naming, station):
-        return "with another size in the power of eddies than in the course of the signal"
-    return ""
+def _in_words(terms: Sequence[Term], objection: Objection) -> str:
+    """What would fit, and what speaks against it, for people."""
+    return f"{' and '.join(_names(terms))} would fit, but {objection.words}"
 
 
 def _names(terms: Sequence[Term]) -> list[str]:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
-from wind_sensors.diagnosis.proving.decision import REMAINDER_SCORES
+from wind_sensors.diagnosis.proving.remainder import REMAINDER_SCORES
 from wind_sensors.diagnosis.regions import Found
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.diagnosis.watch.believing import Rival, believed

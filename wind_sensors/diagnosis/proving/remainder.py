@@ -1,10 +1,9 @@
-"""From an explanation to a verdict: what it leaves, and when nothing can be said."""
+"""What an explanation leaves: in regions of the data, and in the noise."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -12,18 +11,15 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
-from wind_sensors.diagnosis.explaining.detectable import Detectable
-from wind_sensors.diagnosis.explaining.explanation import Alternative, Naming
+from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import window_of
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, simulated_with
+from wind_sensors.diagnosis.explaining.terms import simulated_with
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.regions import Region, RegionBank
 from wind_sensors.station.model import Propeller, Station
 
 FloatArray = npt.NDArray[np.float64]
-
-Verdict = Literal["none", "named", "ambiguous", "unknown", "inconclusive"]
 
 REMAINDER_SCORES = {
     "frequency": 60.0,
@@ -47,26 +43,16 @@ STIRRED_TIMES = 5.0
 """So many times more. A mast that sways leaves many times that in one band."""
 
 REMAINDER_SCORE = 0.8
-REMAINDER_SHARE = 0.025
-LEAST_REMAINDER = 0.006
-"""A remainder makes a name unknown beyond this part of those scores if the score, relative to them,
-times its share of what there was to explain is more than the second, and that share more than the
-third: of a large effect the form may leave more, and of two four times as much, each with its own
-and with what it makes of the other's. Where the forms are certain two leave no more than one."""
+"""Part of the score at which a remainder is structure without a name from which it may count
+against a name: what fits leaves less than what nothing explains."""
 
 REMAINDER_P = 0.05
-"""Nor does a remainder count that a healthy day shows with more probability."""
+"""A remainder does not count that a healthy day shows with more probability."""
 
 CHANGED = 30.0
 CHANGED_SHARE = 0.05
 """An effect changes a signal if it does so by this much, in squares of noise, or by this share of
 what it changes in all of them: a vane that is turned a little carries its propeller along."""
-
-FREELY_BENT = 5
-BENT_REMAINDER_P = 0.01
-"""Effects with so many parameters are series that follow whatever goes with direction or heading:
-what they leave that a healthy day shows with less probability speaks against them however little
-it is."""
 
 NOISY = 6.0
 VERY_NOISY = 8.0
@@ -80,17 +66,6 @@ change, and for twice as many seconds before and after, a residual's noise says 
 
 LEAST_UNSTIRRED = 0.15
 """Share of the record that must be left for its noise to be judged."""
-
-MOST_FREE_PARAMETERS = 1
-FEW_PARAMETERS = 2
-CERTAIN_GAIN = 50.0
-FEW_CERTAIN_GAIN = 40.0
-"""An explanation with more parameters than the first that brings less than the third (with no more
-than the second: the fourth) must also stand out somewhere in the data."""
-
-TOO_BLUNT = 6.0
-"""A record that shows no effect below this many smallest sizes is inconclusive."""
-
 
 @dataclass(frozen=True)
 class Remainder:
@@ -229,57 +204,3 @@ def unstirred(naming: Naming, station: Station) -> Comparison | None:
 def is_noisy(naming: Naming, excess: Excess) -> bool:
     """Whether more noise is left than any healthy day leaves."""
     return excess.score > (NOISY if naming.fit.terms else VERY_NOISY)
-
-
-def _patchwork(naming: Naming) -> bool:
-    """Whether passing effects were pieced together on the same signals: nothing known fits."""
-    comparison = naming.whitener.comparison
-    passing = [
-        instrument
-        for term in naming.fit.terms
-        if term.interval != ALWAYS
-        for instrument in comparison.affected(comparison.station, term.instrument)
-    ]
-    return len(passing) != len(set(passing))
-
-
-def verdict_of(
-    naming: Naming,
-    equal: list[tuple[int, Alternative]],
-    remainder: Remainder,
-    detectable: Mapping[str, Detectable],
-    located_p: float,
-    excess: Excess,
-) -> Verdict:
-    """The verdict on a naming, before its findings are proved one by one.
-
-    Args:
-        naming: The explanation.
-        equal: Explanations that fit as well.
-        remainder: What it leaves.
-        detectable: Smallest detectable sizes, by effect.
-        located_p: Probability, on a healthy day, of the strongest region without any effect.
-        excess: Noise over that of healthy days.
-    """
-    p, share = remainder.p, remainder.share
-    if is_noisy(naming, excess):
-        return "unknown"
-    if not naming.fit.terms:
-        if remainder.is_structure:
-            return "unknown"
-        sizes = sorted(each.relative for each in detectable.values())
-        if not sizes or sizes[len(sizes) // 3] > TOO_BLUNT:
-            return "inconclusive"
-        return "none"
-    certain = CERTAIN_GAIN if naming.fit.active > FEW_PARAMETERS else FEW_CERTAIN_GAIN
-    asked_for = located_p <= REMAINDER_P or naming.gain > certain
-    if naming.fit.active > MOST_FREE_PARAMETERS and not asked_for:
-        return "none"
-    forms = sum(not term.has_certain_form for term in naming.fit.terms)
-    product = REMAINDER_SHARE * max(forms, 1) ** 2
-    sizeable = share > max(product / max(remainder.score, 1e-9), LEAST_REMAINDER)
-    bent = any(len(term.effect.parameters) >= FREELY_BENT for term in naming.fit.terms)
-    counts = (p < REMAINDER_P and sizeable) or (p < BENT_REMAINDER_P and bent)
-    if (remainder.score > REMAINDER_SCORE and counts) or _patchwork(naming):
-        return "unknown"
-    return "ambiguous" if equal else "named"
