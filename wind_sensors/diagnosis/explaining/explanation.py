@@ -21,7 +21,8 @@ from operator import itemgetter
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit, parameters_of
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
+from wind_sensors.diagnosis.explaining.problem import parameters_of
 from wind_sensors.diagnosis.explaining.search import (
     PENALTY_PER_FURTHER_PARAMETER,
     PENALTY_PER_PARAMETER,

@@ -15,8 +15,9 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison, Trust
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.explaining.bounds import without_idle, without_run_aways
-from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit, parameters_of
+from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.guesses import BLIND_EFFECTS
+from wind_sensors.diagnosis.explaining.problem import parameters_of
 from wind_sensors.diagnosis.explaining.recent import Recent
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.screening import (
