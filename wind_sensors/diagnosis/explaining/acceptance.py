@@ -56,48 +56,60 @@ MANY_FORMS = 3
 """So many fitted parameters that have a healthy value count as several, whichever of them says how
 large the effect is: a lean makes of an imbalance what the wind's wandering needs."""
 
-ACCEPTED_FURTHER_GAIN = 20.0
-LEAST_BESIDE_GAIN = 24.0
-"""The same for a second effect on the same signals; the first is what the simulation's form may err
-by, the second what must be brought at least."""
-
 ACCEPTED_ELSEWHERE_GAIN = 18.0
-"""The same for a second effect on signals that the first does not reach."""
+"""The same as `ACCEPTED_GAIN` for a second effect on signals that the first does not reach: what
+that leaves is no healthy day's."""
+
+LEAST_BESIDE_GAIN = 24.0
+"""The same for a second effect on signals that the first reaches, where its form errs, too."""
 
 FURTHER_SHARE = 0.1
-"""A further effect on the same signals must also bring this share of the gain so far."""
+"""What the simulation's form may err by, as a share of the gain so far: a further effect on the
+same signals must bring more than that."""
+
+ACCEPTED_FURTHER_GAIN = 20.0
+"""It is never taken to err by less: of a small gain the share is less than what chance brings."""
 
 LARGEST_INEXACTNESS = 1000.0
-"""But never more than this, or than the least share."""
+"""Nor by more, unless `LEAST_SHARE_BESIDE` is more."""
 
 FURTHER_EXACT_SHARE = 0.05
+"""`FURTHER_SHARE` where the forms of the effects so far are certain: what errs is the reference."""
+
 LARGEST_EXACT_INEXACTNESS = 150.0
-"""The same beside effects whose form is certain."""
+"""`LARGEST_INEXACTNESS` where they are certain, unless `LEAST_EXACT_SHARE_BESIDE` is more."""
 
 ALIKE = 0.05
 """Further effects act in a part of what is compared (series, bands, statistics, activity) with
 this share of all that they change, in squares."""
 
 TRACE = 0.01
+"""An effect acts where it changes a signal by more than this share of its largest change: filters
+and inertia let any change die out slowly."""
+
 ROUNDING = 1e-6
-"""An effect acts where it changes a signal by more than this share of its largest change, and than
-the second [m/s]: bounces that are told from edges leave the rate as it is."""
+"""And by more than this [m/s]: bounces that are told from edges leave the rate as it is, but for
+its last digits."""
 
 PASSING_BESIDE = 3.0
 """So many times more, if it begins or ends inside the record: effects grow and fade themselves."""
 
 LEAST_SHARE_BESIDE = 0.02
+"""What brings less than this share of the gain so far is the form of what brought that, however
+much that is."""
+
 LEAST_EXACT_SHARE_BESIDE = 0.005
-"""What brings less than this share of the gain so far is the form of what brought that; the second
-where that form is certain."""
+"""The same where that form is certain."""
 
 SMALLEST_SIZE = 0.7
 """In units of the smallest size worth reporting."""
 
 SMALLEST_SURE = 0.35
+"""The same of the only effect, if it always holds and brings `SURE_ALONE_GAIN`: half as large, for
+another name would have to take its place."""
+
 SURE_ALONE_GAIN = 50.0
-"""The same of the only effect, if it always holds and brings so much: nobody doubts it, and another
-name would have to take its place."""
+"""Gain of an effect that nobody doubts, however small it is."""
 
 SMALLEST_TOLD = 0.4
 """The same of what the signals tell without a fit: left out, it would be a riddle."""

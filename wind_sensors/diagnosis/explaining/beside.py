@@ -25,6 +25,7 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 LATER_CANDIDATES = 6
+"""So many of the best effects of the screening are tried beside another."""
 
 LARGE_CANDIDATES = 5
 """So many of the best single effects are tried beside another in the size that they have alone."""

@@ -50,16 +50,30 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 MERGE_CANDIDATES = 8
-MERGE_FINALISTS = 3
-SWAP_CANDIDATES = 5
-SWAP_FINALISTS = 4
-SWAP_GAIN = 1.0
+"""So many of the best effects of the screening are tried in the place of several, beside those that
+did well alone: one that stands for two need not be the best of them."""
 
+MERGE_FINALISTS = 3
+"""So many of those that fit best there are judged in the noise that they leave, which takes a null
+and a fit each."""
+
+SWAP_CANDIDATES = 5
+"""So many of the best effects of the screening are tried in the place of one, beside those that
+competed with it: fewer, for it is done for each place."""
+
+SWAP_FINALISTS = 4
+"""So many of those that fit best there are judged in the noise that they leave."""
+
+SWAP_GAIN = 1.0
+"""What takes the place of another one must fit better by more than this: two that fit alike would
+take turns for what fits leave undone (`ROUGHLY`)."""
 
 LOOKS = (0.75, 0.88, 1.14, 1.33)
 """Sizes at which a fit is looked at again, in its own: a vane that turns round the other way, or a
 pulse on the other side of a bin's border, leaves hollows in the cost that small steps stay in."""
+
 MOST_LOOKS = 4
+"""So often a fit is looked at again from where the last look led."""
 
 
 def looked_around(searcher: Searcher, whitener: Whitener, current: Fit) -> Fit:

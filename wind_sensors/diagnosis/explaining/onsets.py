@@ -42,10 +42,18 @@ SHORTEST_WINDOW = 60.0
 """What lasts less [s] tells an effect badly from a gust."""
 
 WINDOW_CANDIDATES = 4
+"""So many effects are fitted in a part of the record, those that promise most there."""
+
 WINDOW_ADVANTAGE = 12.0
+"""They must promise so much more there than if they always held: as much as a beginning or an end
+must bring (`CLEARLY_BETTER`)."""
+
 SMOOTHING_WINDOW_ADVANTAGE = 18.0
+"""The same if they smooth: for some minutes the reference sees other eddies than the
+instrument."""
+
 LEAST_WINDOW_GAIN = 20.0
-"""What an effect must promise in a part of the record to be fitted there."""
+"""And so much in all: one edge costs half of it."""
 
 ONSET_GAIN = 20.0
 """What a beginning or an end of a named effect must bring beyond its cost."""

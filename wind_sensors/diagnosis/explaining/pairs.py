@@ -42,15 +42,24 @@ FITTED_PAIRS = 5
 """So many of the most promising starting points are fitted."""
 
 SEVERAL = 2
+"""An effect of so many fitted parameters is challenged by pairs built on simple effects: it may
+imitate both."""
+
 SIMPLE_SHARE = 0.4
+"""On those that gain this share of what it gains: the larger of two that it imitates does."""
+
 BUILT_PAIRS = 2
+"""So many of them, the best."""
+
 BESIDE_CANDIDATES = 4
-"""An effect of so many parameters is challenged by pairs built on the best simple effects that
-explain this share of it, each with the best of so many beside it."""
+"""So many effects are tried beside each, the best of the screening."""
 
 SMALLEST_SHARE = 0.3
+"""A fit of a pair begins with no less of an effect's size alone: with less there is no way to see
+where it helps."""
+
 LARGEST_SHARE = 2.5
-"""Beside another effect, one has this part of its size alone, at least and at most."""
+"""Nor with more: two that undo each other ask for any size."""
 
 
 def better_pair(

@@ -14,7 +14,7 @@ from wind_sensors.diagnosis.comparing.raw_statistics.pulses import LONG, SHORT
 from wind_sensors.diagnosis.comparing.raw_statistics.slots import SlotIntervals, slot_intervals
 from wind_sensors.diagnosis.effects.output import slot_values
 from wind_sensors.diagnosis.explaining.intervals import interval_of, window_of
-from wind_sensors.diagnosis.explaining.ruled_out import comes_sooner
+from wind_sensors.diagnosis.explaining.ruled_out import SOONER, comes_sooner
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Interval, Term, suggested
 from wind_sensors.station.losses import LOSS_SPEED
 from wind_sensors.station.model import Cup, Rotor, Station
@@ -31,23 +31,28 @@ LEAST_SWING = 3.0
 """Change of temperature [K] from which a bearing may be seen to stiffen."""
 
 BRAKES = (0.5, 2.0, 6.0)
-STIFFENINGS = (-0.03, -0.08, -0.16)
-"""Squared friction speeds at the mean temperature [m^2/s^2] and coefficients [1/K] to begin with:
-the two make up for each other, so that a search for one at a time gets lost."""
+"""Squared friction speeds at the mean temperature [m^2/s^2] to begin with, each with each of
+`STIFFENINGS`: the two make up for each other, so that a search for one at a time gets lost."""
 
-STARTING_SPEEDS = (0.7, 0.8, 0.9, 1.0)
-BREAKAWAYS = (1.5, 2.2, 3.2, 4.6, 6.8)
-"""Speeds from which a rotor that stands still in the wind starts to turn, relative to `HELD` of
-those in which it stands, and friction at rest relative to that of the turning rotor, to begin with:
-stops and starts make the cost too rough to search."""
+STIFFENINGS = (-0.03, -0.08, -0.16)
+"""Coefficients of its change with the temperature [1/K] to begin with."""
 
 HELD = 0.95
-"""Quantile."""
+"""Quantile of the winds in which a rotor stands still that is taken for its starting speed: the
+strongest of them are gusts that did not last."""
+
+STARTING_SPEEDS = (0.7, 0.8, 0.9, 1.0)
+"""Speeds from which a rotor that stands still in the wind starts to turn, relative to `HELD`, to
+begin with, each with each of `BREAKAWAYS`: stops and starts make the cost too rough to search."""
+
+BREAKAWAYS = (1.5, 2.2, 3.2, 4.6, 6.8)
+"""Friction at rest relative to that of the turning rotor to begin with."""
 
 STANDS_STILL = 0.2
+"""Rate [m/s] below which a rotor counts as standing: less than any starting speed."""
+
 LEAST_HELD = 0.02
-"""Rate [m/s] below which a rotor counts as standing, and share of the record for which a bearing
-that sticks has to hold it."""
+"""Share of the record for which a bearing that sticks has to hold a rotor: in a lull any stops."""
 
 PARTS_OF_PULSES = 30
 """Parts of the record, at whose ends a counter may begin or cease to lose what follows too soon,
@@ -60,21 +65,40 @@ SHORTEST_SHARE = 0.001
 """Share of intervals that are shorter than a dead time all the same: pulses of another cause."""
 
 EDGE = 0.03
+"""Intervals are just above or below the shortest within this share of it: as much as a
+rotor's rate varies from pulse to pulse."""
+
 SHARP = 6.0
-"""A counter's dead time shows if so many times as many intervals lie just above the shortest,
-within this share of it, as below: a fit of the whole signal would trade it for another gain."""
+"""A counter's dead time shows if so many times as many intervals lie just above the shortest as
+below: a fit of the whole signal would trade it for another gain."""
+
+TELLING_SHARE = 0.004
+"""Share of a rotor's intervals from which on those that are too long, too short or missing suggest
+an effect of its counter: by that much stations differ from their simulation anyway."""
+
+TELLING_UNEVENNESS = 0.003
+"""Unevenness of the slots, as their statistics measure it, from which on the pulses are asked where
+each slot is."""
 
 PARTS_OF_LOSSES = 8
+"""Parts of the record in each of which pulses that are lost all the time are lost."""
+
 UNSTEADY = 4.0
+"""They are not lost all the time if their number in one of these differs from what is expected by
+so many times what chance makes."""
+
 UNSTEADY_SHARE = 0.5
-"""Pulses are not lost all the time if their number in such a part of the record differs from what
-is expected by so many times what chance makes and by this share."""
+"""And by this share of it: how losses go with the rate is known only so well."""
 
 PASSED = 1.3
+"""Intervals that should be so many times as long as a dead time pass it, whatever they scatter by:
+what is lost of them is lost otherwise."""
+
 LEAST_PASSED = 500
+"""Of fewer such intervals nobody knows whether `LOST_BESIDE` is missing: it were one."""
+
 LOST_BESIDE = 0.002
-"""Pulses are lost beside a dead time if more than this share is, of so many intervals at least that
-should have been so many times as long as it."""
+"""Share of them above which pulses are lost beside a dead time."""
 
 APART = 5.0
 """Bounces tell their delay if so many times as many intervals are shorter than three tenths of the
@@ -88,6 +112,7 @@ MOST_GROWTH = 4.0
 """Exponent beyond which no search begins."""
 
 _RATE_THAT_TURNS = 1.5
+"""Rate [m/s] at which a healthy rotor certainly turns: beyond any starting speed."""
 
 
 def rotor_guesses(
@@ -165,12 +190,12 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
     usual_long = float(np.mean(usual[1:] > LONG * usual[:-1]))
     dead = _dead_times(comparison, rotor, (time[1:], interval), (expected_time[1:], usual))
     dead = [_without_chance(term, relative > LONG, local, usual_long) for term in dead]
-    if long > 0.004 + 2.0 * usual_long and not any(term.held for term in dead):
+    if long > TELLING_SHARE + 2.0 * usual_long and not any(term.held for term in dead):
         per_turn = 2.0 * np.pi * rotor.calibration_distance / rotor.pulses_per_revolution
         speed = per_turn / np.maximum(local, 1e-9)
         out.append(_losses_by_chance(rotor, relative > LONG, speed))
     out.extend(dead)
-    if short > 0.004:
+    if short > TELLING_SHARE:
         delay = float(np.mean(interval[relative < SHORT]))
         bounce = suggested(
             "extra_pulses", rotor.name,
@@ -184,7 +209,7 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
         BANDS + 2 : BANDS + 4
     ]
     slots = rotor.pulses_per_revolution
-    if slots > 2 and max(scatter, once) > 0.003:
+    if slots > 2 and max(scatter, once) > TELLING_UNEVENNESS:
         seen = slot_intervals(time, slots)
         holds = _uneven_span(comparison, seen)
         if isinstance(rotor, Cup):
@@ -317,8 +342,9 @@ def _dead_times(
         few = np.concatenate(shortest_few[begin:end])
         rank = int(SHORTEST_SHARE * intervals)
         shortest = float(np.partition(few, rank)[rank])
-        missing = sum(int(np.searchsorted(cell, 0.97 * shortest)) for cell in found[1][begin:end])
-        if missing > 0.004 * usual and (best is None or missing > best[0]):
+        least = SOONER * shortest
+        missing = sum(int(np.searchsorted(cell, least)) for cell in found[1][begin:end])
+        if missing > TELLING_SHARE * usual and (best is None or missing > best[0]):
             best = missing, shortest, interval_of(comparison, cuts[begin], cuts[end])
     if best is None:
         return []

@@ -44,12 +44,18 @@ from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FIRST_CANDIDATES = 9
+"""So many of the best effects of the screening are fitted alone."""
 
 LATER_WIDE = 2
 """So many of the effects that turn or carry the whole wind are tried from the best moment on."""
 
 FINALISTS = 7
+"""So many of the best fits, in the common noise and in their own, are judged in the noise that they
+leave, with derivatives carried along."""
+
 CONTENDERS = 5
+"""So many of the best of these are judged once more, with derivatives of their own."""
+
 FAR_BEHIND = 0.8
 """Fits that miss more than this share of the leader's gain do not compete with it."""
 

@@ -17,20 +17,27 @@ from wind_sensors.station.model import Angle, Station
 FloatArray = npt.NDArray[np.float64]
 
 SOONER = 0.97
+"""An interval shorter than this share of a counter's dead time is none that it lets pass, whatever
+is uncertain of stamps."""
+
 FEWEST_SOONER = 5
-"""A counter that stops being deaf shows so many intervals shorter than this share of its dead
-time."""
+"""A counter that stops being deaf shows so many of them: fewer may be pulses of another cause."""
 
 TOO_SOON = 0.9
+"""An interval shorter than this share of a dead time that a fit told, less surely than pulses tell
+it, should not be there while the counter is deaf."""
+
 MOST_TOO_SOON = 0.02
-"""While a counter is deaf for some time after each pulse, no more than the second share of the
-intervals between pulses is shorter than the first share of that time."""
+"""Share of the intervals that may be, all the same."""
 
 BY_CHANCE = 1e-6
+"""Pulses lost one by one do not leave a silence of which the probability is less."""
+
 SHORTEST_SILENCE = 5.0
+"""In a shorter one [s] a rotor may have stood still in a lull."""
+
 FEWEST_DUE = 50
-"""Pulses lost one by one leave a silence as long as that of the record with less probability. In a
-shorter one [s], or one in which fewer pulses are due, a rotor may have stood still in a lull."""
+"""As in one in which fewer pulses are due."""
 
 FLOATS = 2.0
 """Form of a gap in which the reading may be anything."""
@@ -39,9 +46,10 @@ INSIDE = 0.5
 """The middle of a gap: this share of its width."""
 
 FEWEST_EXPECTED = 50
+"""Readings say nothing of a gap in whose middle a healthy vane would have fewer."""
+
 READ_INSIDE = 0.6
-"""A vane that shows this share of the readings that a healthy one would have in the middle of a
-sector, and so many would have been there, has no gap there."""
+"""A vane that shows this share of those has no gap there."""
 
 FROM_POSITIONS = 0.5
 """A platform's velocity is that of its positions from this share on."""

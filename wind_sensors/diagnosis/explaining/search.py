@@ -51,8 +51,10 @@ from wind_sensors.station.model import Station
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_GAIN = 6.0
+"""Effects whose linear score stays below this are not fitted: a name needs more by far."""
+
 LEAST_SHARE = 0.03
-"""Effects whose linear score stays below this, or below this share of the best, are not fitted."""
+"""Nor those whose score stays below this share of the best."""
 
 FIRST_ITERATIONS = 3
 """Gauss-Newton steps from each starting point of a candidate."""
@@ -64,9 +66,11 @@ TIMES_DERIVED = 8
 """About so often a candidate's derivatives are taken, to tell which candidates take long."""
 
 TRIED_STARTS = 2
+"""So many of an effect's starting points are fitted, those with the least deviance."""
+
 CLOSE_START = 0.05
-"""A second starting point is tried if its deviance lies within this share of the number of data
-of the best one's."""
+"""The second only if its deviance lies within this share of the number of data of the best one's:
+one farther away ends where the best one does, or worse."""
 
 LARGER_STARTS = (2.0, 4.0)
 """Multiples of the linear estimate that are tried as well: a vane that turns round on the way makes

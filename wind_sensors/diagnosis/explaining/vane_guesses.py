@@ -24,44 +24,74 @@ LONGEST_REPEAT = 4.0
 SAME_VALUE = 1e-3
 """Readings so close to each other are the same [deg]."""
 
-NARROWEST_HOLE, WIDEST_HOLE = 3, 60
+NARROWEST_HOLE = 3
+"""A hole in a vane's readings is at least so wide [deg]: a degree or two stay empty by chance."""
+
+WIDEST_HOLE = 60
+"""And no wider [deg]: in more the wind may not have blown."""
+
 EMPTY = 0.03
+"""No degree of a hole has this share of the readings that usual degrees have."""
+
 BESIDE_HOLE = 20
+"""A hole lies between so many degrees on either side in which the vane often stands: what has none
+on one side is where the wind did not blow from."""
+
 LEAST_BESIDE_HOLE = 0.015
-"""A hole in a vane's readings is so many degrees wide, no degree of it has the second share of what
-usual degrees have, and so many degrees on either side have this share of all readings."""
+"""These degrees hold this share of all readings, on either side: a quarter of what they would if
+the vane stood everywhere alike."""
 
 MANY_BESIDE_EDGE = 3
+"""A degree beside a gap with a floating wiper has so many readings more than degrees inside have by
+chance."""
+
 RARELY = 4.0
-"""A degree beside a gap with a floating wiper has so many readings, and so many standard deviations
-of chance, more than degrees inside have by chance."""
+"""And so many standard deviations of chance more."""
 
 BESIDE_EDGE = 3.0
-LEAST_BESIDE_EDGE = 15
-"""So many degrees beside it tell how often the vane stands there; fewer readings do not tell where
-it begins."""
+"""So many degrees beside a gap tell how often the vane stands there: farther away it may be another
+wind."""
 
-LEAST_ERRATIC = 0.004
-"""Share of erratic readings from which a gap with a floating wiper is considered."""
+LEAST_BESIDE_EDGE = 15
+"""Readings in these degrees, more than chance brings, from which on they tell to
+`Parameter.told_to` where the gap begins."""
+
+TELLING_SHARE = 0.004
+"""Share of a vane's readings from which on erratic ones suggest a gap with a floating wiper, equal
+ones a gap that reads one value."""
 
 NARROWER = (1.0, 0.65, 0.4)
 """Widths to begin with, in widths of the sector where the nose should have been: the reference
 does not tell that within some degrees."""
 
 REPEATED = 6.0
+"""A reading repeats itself if it comes so many times as often as readings do on average."""
+
 LEAST_REPEATS = 20
+"""And so often at least: of fewer, chance or a lull makes some equal."""
+
 FEWEST_STEPS = 3
+"""Readings are coarse where so many different ones repeat themselves: with two there is no telling
+steps from stops."""
+
 SMOOTHED_READINGS = 101
-ON_A_STEP = 0.01
+"""And most of so many readings in a row do."""
+
 SHORTEST_COARSE = 60.0
+"""For so long [s]: what is shorter no effect is told by."""
+
 ON_STEPS = 0.9
-FEWEST_VISITS = 2.0
+"""They lie on steps: the mean vector of their remainders is longer, 1 being exactly on them."""
+
+ON_A_STEP = 0.01
+"""A single one is on a step if it lies within so much [deg] of it: digits are lost on the way."""
+
 WIDEST_STEP = 45.0
-"""Readings that come so many times as often as others, and so often, are coarse: at least three
-different ones, most of so many readings in a row, for so long [s]; they lie on steps of no more
-[deg] (mean vector of their remainders; each within so much [deg] of one), and the vane comes back
-to them: one that sticks stands where it happened to.
-"""
+"""Steps are narrower [deg]: on eight points of the compass any few readings lie."""
+
+FEWEST_VISITS = 2.0
+"""The vane comes to each of them so often on average: one that sticks stands where it happened
+to."""
 
 
 def vane_guesses(comparison: Comparison, channel: Channel, vane: Angle) -> list[Term]:
@@ -122,7 +152,7 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
             out.append(suggested("quantisation", vane, step=step, origin=origin))
     if not out:
         out.extend(_coarse_for_a_while(comparison, vane))
-    common = values[counts > max(0.004 * readings.size, 20)]
+    common = values[counts > max(TELLING_SHARE * readings.size, LEAST_REPEATS)]
     hole = hole_between(degrees)
     if hole is not None:
         out.append(_gap(vane, *hole))
@@ -244,7 +274,7 @@ def _gap(
 def _floating(comparison: Comparison, channel: Channel) -> list[Term]:
     """A gap where readings jump about, in the sector in which they do."""
     wrong = comparison.recording.angles[channel.instrument].erratic
-    if not wrong.any() or np.mean(wrong) < LEAST_ERRATIC:
+    if not wrong.any() or np.mean(wrong) < TELLING_SHARE:
         return []
     vane = channel.instrument
     centre, width = _sector(comparison, channel, wrong)

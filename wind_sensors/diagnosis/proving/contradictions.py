@@ -29,20 +29,28 @@ from wind_sensors.station.model import Cup, Propeller, Station
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_TOGETHER = 0.4
-LEAST_CHANGE = 30.0
 """Two effects that change a signal must together change it by this share of the sum of what each
-does, in squares, if that is more than the second."""
+does, in squares: if they had nothing to do with each other it were 1."""
+
+LEAST_CHANGE = 30.0
+"""Sum of what each of two effects does to a signal, in squares of noise, above which that is asked:
+of less, noise tells not much."""
 
 QUARTERS = 4
 """They take each other back if they do so in each of so many parts of the record: a clock that
 drifts makes good a filter's delay at one time only."""
 
 PARTS = 8
+"""What always holds, in a form that is certain, is the same in each of so many parts of the record,
+and in each two and four of them in a row."""
+
 VARIES = 30.0
+"""A size of its own in one of them must not drop the cost by more than this: there are many parts
+to choose from, and in any of them the wind may have taken another way to the reference."""
+
 VARIES_SHARE = 0.03
-"""What always holds, in a form that is certain, is the same in every part, half and quarter of the
-record: a size of its own in one of them must not drop the cost by more than this, or than this
-share of the gain."""
+"""Nor, of what gains much, by more than this share of the gain: there the simulation's own
+inexactness is seen."""
 
 CLOCK_VARIES_SHARE = 0.1
 """A delay's share may be larger: which eddies a reference shares with an instrument changes."""
@@ -62,42 +70,58 @@ AT_A_JUMP = 2.0
 """Where a clock's stamps jump, so many seconds say nothing: pulses on either side share a bin."""
 
 GROWS = 12.0
+"""A size that grows or shrinks steadily through the record must not drop the cost by more than
+this, which is less than `VARIES`, for there is only one way to grow: a clock that drifts is no
+delay."""
+
 GROWS_SHARE = 0.02
-"""Nor may a size that grows or shrinks steadily through the record drop it by more than this, or
-than this share of the gain: a clock that drifts is no delay."""
+"""Nor, of what gains much, by more than this share of the gain."""
 
 SPEED_TIME = 5.0
+"""Wind is weak or strong as it blows on average over so many seconds: as long as eddies that both
+the reference and the instruments feel."""
+
 WITH_SPEED = 14.0
+"""An effect has one size in weak wind and in strong wind: one that grows or shrinks with the speed
+must not drop the cost by more than this. Otherwise a fin that gives way is taken for a heavy vane,
+a cable that pulls for a disc off centre."""
+
 WITH_SPEED_SHARE = 0.02
+"""Nor, of what gains much, by more than this share of the gain: the simulated form errs, too."""
+
 WITH_SPEED_EXACT_SHARE = 0.005
+"""The same where the form is certain: there only the reference errs."""
+
 WITH_SPEED_FORM = 0.4
+"""The same share, in units of the error that its form leaves of a size, of what errs by more."""
+
 WITH_SPEED_FADING = 5.0
-"""An effect has one size in weak wind and in strong wind, which blows within so many seconds: a
-size that grows or shrinks with the speed must not drop the cost by more than the second, or than
-this share of the gain: the third, where the form is certain the fourth, and where a size is known
-to err by its form so many times that error. The last is the most for what fades: its law is all
-that tells it from others (true imbalances have dropped it by up to 1.5, those that were cables or
-discs off centre by 5.3 to 15). A fin that gives way is taken for a heavy vane otherwise, a cable
-that pulls for a disc off centre."""
+"""The same, whatever the gain, of what fades as the wind grows: its law is all that tells it from
+others. True imbalances have dropped the cost by up to 1.5, those that were cables or discs off
+centre by 5.3 to 15."""
 
 DISCORD = 10.0
-DISCORD_SHARE = 0.02
 """An effect that reaches several signals has one size on all of them: one of its own on each must
-not drop the cost by more than this, or than this share of the gain. A heavier rotor slows its own
-signal as thin air does, which would let the vane overshoot as well."""
+not drop the cost by more than this. A heavier rotor slows its own signal as thin air does, which
+would let the vane overshoot as well."""
+
+DISCORD_SHARE = 0.02
+"""Nor, of what gains much, by more than this share of the gain."""
 
 IN_EDDIES = 22.0
-"""The same of its course and the power of its eddies: of some thirty effects named rightly on
-concealed data, of which it is asked, one differs by 15, an offset that an eddy-current brake made,
-and a filter beside a delay by 13, the others by 6.5 at most; an imbalance that a sound vane's
+"""The same of a signal's course and the power of its eddies: of some thirty effects named rightly
+on concealed data, of which it is asked, one differs by 15, an offset that an eddy-current brake
+made, and a filter beside a delay by 13, the others by 6.5 at most; an imbalance that a sound vane's
 eddies on a boat in a lull asked for differed by 35."""
 
 BURSTS = 2.0
+"""Bounces come in bursts if their number in a second varies by more than so many times what chance
+gives: a radio, or a motor's driver, is taken for the contact. Of eight contacts that bounce none
+had more than 1.1 times, of four radios' bursts each had 10 to 21 times."""
+
 BURSTS_SHARE = 1.0
-"""Bounces whose number in a second varies by more than so many times what chance gives, and beyond
-it by more than this many squares of that number, come in bursts: a radio, or a motor's driver, is
-taken for the contact. Of eight contacts that bounce none had more than 1.1 times, of four radios'
-bursts each had 10 to 21 times, and 2.9 to 13 squares."""
+"""And if what it varies by beyond chance is more than so many squares of that number: a share of
+bounces that goes with the rate varies, too. The bursts of those radios had 2.9 to 13 squares."""
 
 
 def undo_each_other(naming: Naming, station: Station) -> bool:

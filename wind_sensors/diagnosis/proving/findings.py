@@ -28,8 +28,15 @@ LEAST_LIKENESS = 0.4
 half alike fit as well, neither is all that is wrong."""
 
 INTERVAL_FACTOR = 1.96
+"""Standard errors from the middle of a 95 % interval to its ends."""
+
 MISMATCH_FACTOR = 1.25
-"""Intervals are wider than the noise alone would make them, for the simulation is not exact."""
+"""Standard errors are so many times as large as the noise alone would make them, for the simulation
+is not exact."""
+
+LEAST_NOISE = 0.95
+"""Share of the number of data that the squares of noise alone sum up to at least: what exceeds it
+is the misfit of which effects have their shares."""
 
 REPORTED_TOGETHER = 4.0
 """Explanations whose log-likelihoods lie closer are reported together. Where forms are not exact
@@ -231,7 +238,7 @@ def findings_of(
             naming, bank, vector if passing else naming.nothing,
             beside if passing else whitener.comparison.simulate(baseline.station), term,
         ) or before[0]  # fmt: skip
-        share = gain / max(misfit - 0.95 * naming.nothing.size, gain)
+        share = gain / max(misfit - LEAST_NOISE * naming.nothing.size, gain)
         out.append(
             Finding(
                 term, estimates[k], own, float(np.clip(share, 0.0, 1.0)),

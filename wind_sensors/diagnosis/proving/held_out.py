@@ -19,15 +19,18 @@ from wind_sensors.station.model import Station
 FloatArray = npt.NDArray[np.float64]
 
 BLOCKS = 12
-"""The record is cut into so many blocks,"""
+"""The record is cut into so many blocks, or more."""
 
 FINEST = 4
+"""Up to so many times as many."""
+
 LEAST_IN_A_HALF = 0.15
+"""Until every other block holds this share of what each effect changes: a vane that is in its gap
+for one minute cannot tell, in the minutes without it, what the gap reads."""
+
 ACTS_IN_SERIES = 1.0
-"""or up to so many times as many, until every other one holds this share of what each effect
-changes: a vane that is in its gap for one minute cannot tell, in the minutes without it, what the
-gap reads. What changes the series by less than the last, in squares of noise, shows in statistics
-alone."""
+"""What changes the series by less, in squares of noise, shows in statistics alone, and asks for no
+finer blocks."""
 
 GAP = 4.0
 """Between a fitted and a scored block [s]."""

@@ -50,19 +50,26 @@ REMAINDER_P = 0.05
 """A remainder does not count that a healthy day shows with more probability."""
 
 CHANGED = 30.0
+"""An effect changes a signal if it does so by this much, in squares of noise: a vane that is turned
+a little carries its propeller along, which is next to nothing."""
+
 CHANGED_SHARE = 0.05
-"""An effect changes a signal if it does so by this much, in squares of noise, or by this share of
-what it changes in all of them: a vane that is turned a little carries its propeller along."""
+"""Or by this share of what it changes in all signals: of a small effect there may be no more."""
 
 NOISY = 6.0
+"""Noise beyond this many standard deviations of healthy days is physics that a name left out: of
+few healthy days nobody knows their scatter well."""
+
 VERY_NOISY = 8.0
-"""Noise beyond this many standard deviations of healthy days is physics that a name left out;
-without any name, where a reference of another day may err more, beyond the second."""
+"""The same without any name, where the reference of that day may err more."""
 
 STIRRED = 0.01
-STIRRED_TIME = 5.0
 """Where an effect with eddies of its own changes a signal by more than this share of its largest
-change, and for twice as many seconds before and after, a residual's noise says nothing."""
+change, a residual's noise says nothing."""
+
+STIRRED_TIME = 5.0
+"""Nor for twice as many seconds [s] before and after: eddies travel on, and instruments answer
+late."""
 
 LEAST_UNSTIRRED = 0.15
 """Share of the record that must be left for its noise to be judged."""

@@ -21,38 +21,52 @@ LEAST_OF_ALL = 0.2
 up less is not what is wrong with the record."""
 
 LEAST_NOISY_REMOVED = 0.5
+"""The same as `LEAST_REMOVED` where an effect comes with noise of its own, which is another one in
+blocks that were not fitted."""
+
 NOISE_LEFT = 1.1
-"""The same where an effect comes with noise of its own, which is another one in other blocks, if no
-more is left than so many times the noise of a healthy day."""
+"""If no more is left there than so many times the noise of a healthy day."""
 
 MOST_SHARED = 1.5
-MOST_ALONE = 0.75
 """Largest sum of what two effects on the same signals bring, each in the other's presence, over
-what they bring together, unless one of them brings the second share of that alone: beside friction
-that makes a vane jump, damping that calms it is no help to either."""
+what they bring together: more, and each only makes good what the other does."""
+
+MOST_ALONE = 0.75
+"""Unless one of them brings this share of what they bring together alone: beside friction that
+makes a vane jump, damping that calms it is no help to either."""
 
 OWN_SHARE = 0.5
 """An effect with this share of the misfit stands out without a region of its own: a delay moves
 nothing up or down."""
 
 UNSEEN_GAIN = 40.0
-UNSEEN_NOISY_GAIN = 100.0
 """What begins or ends inside the record and brings more need not stand out in a region: what
-changes the quick part of a signal moves none up or down. The second of what acts now and then
-only, and so need not gain all the time."""
+changes the quick part of a signal moves none up or down. On no healthy day does a part of the
+record bring so much."""
+
+UNSEEN_NOISY_GAIN = 100.0
+"""The same of what acts now and then only: it need not gain all the time, so that a few gusts may
+bring what it brings."""
 
 PASSING_P = 0.02
-"""It stands out below this probability: of the many intervals that were tried one fits a gust."""
+"""What begins or ends inside the record stands out below this probability, which is less than
+`SHOWN_P`: of the many intervals that were tried one fits a gust."""
 
 SURE_GAIN = 50.0
+"""One of several effects that brings more, on signals of its own, need not stand out in a
+region."""
+
 SURE_QUICK_GAIN = 30.0
+"""The same of what only damps or delays such signals, and so moves none up or down: no region could
+show it."""
+
 SURE_BESIDE_GAIN = 100.0
-"""The same of what only damps or delays signals of its own, and so moves none up or down; and of
-what acts on the signals of another effect, and so has no region of its own."""
+"""The same of what acts on the signals of another effect of its kind, and so has no region of its
+own: it may be the form of that one."""
 
 SURE_SIZE = 3.0
-"""What brings so much and is so many of the smallest sizes worth reporting is there, whatever the
-intervals of its parameters say."""
+"""What brings `SURE_GAIN` and is so many of the smallest sizes worth reporting is there, whatever
+the intervals of its parameters say."""
 
 
 def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) -> bool:
