@@ -21,7 +21,7 @@ BELOW: dict[str, set[str]] = {
 """For each inner room the rooms that it may import."""
 
 STEPS = (
-    ("effects",),
+    ("effects", "progress"),
     ("comparing",),
     ("healthy",),
     ("regions",),

@@ -27,6 +27,7 @@ from wind_sensors.diagnosis.explaining.rounds import first_round
 from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.healthy.whitening import Whitener
+from wind_sensors.diagnosis.progress import Phases
 from wind_sensors.diagnosis.proving import findings
 from wind_sensors.diagnosis.proving.findings import equal_explanations
 from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of
@@ -188,7 +189,7 @@ def test_a_rival_is_judged_where_the_signals_contradict_the_effect_that_led(
 ) -> None:
     searcher, led = _rivalled()
     assert [t.effect.name for t in led.fit.terms] == ["calibration_drift"]
-    of_leader = judgement_of(searcher, led, baseline(), 1, lambda phase: lambda share: None, False)
+    of_leader = judgement_of(searcher, led, baseline(), 1, Phases(None), False)
     asked: list[str] = []
 
     def judge(naming: Naming) -> Judgement:

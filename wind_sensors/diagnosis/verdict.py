@@ -30,6 +30,7 @@ from wind_sensors.diagnosis.explaining.search import Searcher, searcher_of
 from wind_sensors.diagnosis.explaining.terms import Term, planted
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
+from wind_sensors.diagnosis.progress import Phases
 from wind_sensors.diagnosis.proving.findings import Finding, Unexplained, equal_explanations
 from wind_sensors.diagnosis.proving.judging import Judgement, judgement_of, with_suspicion
 from wind_sensors.diagnosis.proving.rules import Verdict, with_silence
@@ -87,7 +88,7 @@ def _explained(
     comparison: Comparison,
     search: Callable[[Comparison], Searcher],
     dead_log: Sequence[Term],
-    report: Callable[[str], Callable[[float], None]],
+    phases: Phases,
 ) -> tuple[Searcher, Naming]:
     """The explanation of a recording, and the search that found it.
 
@@ -98,7 +99,7 @@ def _explained(
         comparison: The recording.
         search: Prepares the search of a comparison.
         dead_log: The motion that a log hides which does not go with the positions; empty: none.
-        report: Gives a phase's progress function.
+        phases: Are told how much is done.
     """
 
     def seen_moving(
@@ -108,7 +109,7 @@ def _explained(
         if moved is None:
             return None
         again, anew = _first_look(moved, search)
-        naming = name(again, anew, report("fitting effects"))
+        naming = name(again, anew, phases.run("fitting effects"))
         return (again, naming) if _motion(naming.fit.terms) else None
 
     found = seen_moving(dead_log, 0.0)
@@ -118,7 +119,7 @@ def _explained(
     found = seen_moving(first.terms)
     if found is not None:
         return found
-    naming = name(searcher, first, report("fitting effects"))
+    naming = name(searcher, first, phases.run("fitting effects"))
     if _motion(naming.fit.terms) != _motion(first.terms):
         found = seen_moving(naming.fit.terms)
     return found or (searcher, naming)
@@ -245,10 +246,7 @@ def diagnose(
         UserError: The recording cannot be compared with its station.
     """
     known = catalogue() if effects is None else effects
-
-    def report(phase: str) -> Callable[[float], None]:
-        return lambda share: progress(phase, share) if progress else None
-
+    phases = Phases(progress)
     baseline = baseline.for_station(recording.station)
     comparison = prepare(recording, baseline.station, baseline.place)
     if is_calm(comparison):
@@ -262,17 +260,19 @@ def diagnose(
         }
         return searcher_of(
             as_counted(seen, guesses), baseline, known, guesses, workers,
-            report("simulating the catalogue"),
+            phases.run("simulating the catalogue"),
         )  # fmt: skip
 
     dead_log = [term for term in hidden_by_a_dead_log(comparison) if term.effect.name in known]
-    searcher, naming = _explained(comparison, search, dead_log, report)
+    searcher, naming = _explained(comparison, search, dead_log, phases)
+    phases.done()
     comparison = searcher.comparison
     judged = first_claim(
         searcher,
         naming,
-        lambda each: judgement_of(searcher, each, baseline, workers, report, with_proof),
+        lambda each: judgement_of(searcher, each, baseline, workers, phases, with_proof),
     )
+    phases.done()
     judged = with_suspicion(judged, baseline.station, workers)
     naming = judged.naming
     named = naming.fit.terms if judged.is_claim else ()

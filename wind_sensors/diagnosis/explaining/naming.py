@@ -67,9 +67,25 @@ def name(
         first: Its first round.
         progress: Called with the share done.
     """
+    report = progress or (lambda share: None)
+    found = _named(searcher, first, report)
+    report(1.0)
+    return found
+
+
+def _named(
+    searcher: Searcher, first: FirstRound, report: Callable[[float], None]
+) -> Naming:
+    """The same, with one search or two.
+
+    Args:
+        searcher: Prepared search.
+        first: Its first round.
+        report: Called with the share done.
+    """
     whitener, singles = first.whitener, first.singles
     beside: list[Beside] = []
-    found = _greedy(searcher, progress, first, frozenset(), beside)
+    found = _greedy(searcher, lambda share: report(0.5 * share), first, frozenset(), beside)
     if found.fit.terms and not any(term.is_told for term in found.fit.terms):
         pair = better_pair(searcher, whitener, singles, found.fit)
         if pair is not None:
@@ -85,7 +101,10 @@ def name(
         return found
     everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
     led = best_single(searcher, whitener, singles, everywhere)
-    narrow = _greedy(searcher, progress, replace(first, led=led), everywhere, beside)
+    narrow = _greedy(
+        searcher, lambda share: report(0.5 + 0.5 * share), replace(first, led=led), everywhere,
+        beside,
+    )  # fmt: skip
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
     simpler = (
@@ -133,7 +152,7 @@ def named_instead(searcher: Searcher, naming: Naming, rival: Alternative) -> Nam
 
 def _greedy(
     searcher: Searcher,
-    progress: Callable[[float], None] | None,
+    report: Callable[[float], None],
     first: FirstRound,
     excluded: frozenset[str],
     beside: list[Beside],
@@ -142,12 +161,11 @@ def _greedy(
 
     Args:
         searcher: The search.
-        progress: Called with the share done.
+        report: Called with the share done.
         first: Single effects and the one that leads.
         excluded: Names of effects that are not to be used.
         beside: What was tried beside an effect already; grows.
     """
-    report = progress or (lambda share: None)
     nothing = empty_fit(first.whitener, searcher)
     screened = tuple(
         (s.effect, s.instrument, s.gain)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from wind_sensors.diagnosis.healthy.calibrated_range import (
     too_calm,
 )
 from wind_sensors.diagnosis.healthy.noise_level import Excess, described, excess_of
+from wind_sensors.diagnosis.progress import Phases
 from wind_sensors.diagnosis.proving.contradictions import false_in_bursts
 from wind_sensors.diagnosis.proving.findings import (
     Finding,
@@ -118,7 +119,7 @@ def judgement_of(
     naming: Naming,
     baseline: Baseline,
     workers: int,
-    report: Callable[[str], Callable[[float], None]],
+    phases: Phases,
     with_proof: bool,
 ) -> Judgement:
     """What is to be said of an explanation.
@@ -128,13 +129,14 @@ def judgement_of(
         naming: The explanation.
         baseline: What is normal.
         workers: Processes.
-        report: Gives a phase's progress function.
+        phases: Are told how much is done.
         with_proof: Fit and score held-out blocks.
     """
     comparison = searcher.comparison
     whitener = naming.whitener
+    locating, proving = phases.run("locating"), phases.run("proving")
     bank = region_bank(whitener, searcher.bank.without)
-    report("locating")(0.5)
+    locating(0.5)
     before = strongest(whitener, bank, naming.nothing, searcher.bank.without)
     rest = region_bank(naming.adequate, searcher.bank.without)
     left = naming.adequate.of(naming.fit.simulated)
@@ -147,17 +149,18 @@ def judgement_of(
     calm = is_too_calm(comparison, baseline)
     case = Case(naming, equal, remainder, detectable, located_p, excess, calm)
     verdict = first_look(case)
-    report("proving")(0.2)
+    locating(1.0)
     findings = findings_of(
         naming, equal, before, bank, baseline, with_proof, workers
     ) if verdict in CLAIMS else ()  # fmt: skip
-    report("proving")(1.0)
+    proving(0.5)
     objection = None
     if findings:
         structured = located(naming, bank, comparison, baseline).is_structure
         objection = objection_to(
             Claim(verdict, findings, naming, comparison, baseline.station, structured, workers)
         )
+    proving(1.0)
     if objection is not None:
         verdict, findings = objection.leaves, ()
     verdict = of_the_recording(verdict, comparison.repeated, calm)
