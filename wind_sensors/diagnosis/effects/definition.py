@@ -237,6 +237,10 @@ class Effect:
         """Whether it only damps, hastens or delays what the wind does, and moves no mean."""
         return (self.smooths or self.entrance == "clock") and not self.shifts
 
+    def is_confusable_with(self, other: Effect) -> bool:
+        """Whether either can be mistaken for the other."""
+        return other.name in self.confusable or self.name in other.confusable
+
     def growth(self, values: Values) -> float:
         """Time constant [s] with which it approaches its size, 0 where it has it at once."""
         constant = values.get(self.grows, 0.0)

@@ -25,7 +25,7 @@ from wind_sensors.diagnosis.explaining.moments import (
 )
 from wind_sensors.diagnosis.explaining.ruled_out import ruled_out
 from wind_sensors.diagnosis.explaining.search import Searcher
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, reached_by
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import is_calm
 from wind_sensors.diagnosis.healthy.reference_lag import is_a_way_of_the_wind
@@ -269,11 +269,7 @@ def acts_beside(searcher: Searcher, further: Term, terms: Sequence[Term]) -> boo
         further: The term.
         terms: The others.
     """
-    reached = {
-        name
-        for term in terms
-        for name in searcher.comparison.affected(searcher.station, term.instrument)
-    }
+    reached = reached_by(searcher.comparison, searcher.station, terms)
     return bool(terms) and further.instrument in (reached | {STATION, PLATFORM})
 
 
@@ -352,12 +348,8 @@ def overlap(searcher: Searcher, fewer: Fit, more: Fit) -> float:
     """
     comparison = searcher.comparison
     known = {term.key for term in fewer.terms}
-    reached = {
-        name
-        for term in more.terms
-        if term.key not in known
-        for name in comparison.affected(searcher.station, term.instrument)
-    }
+    further = [term for term in more.terms if term.key not in known]
+    reached = reached_by(comparison, searcher.station, further)
     there = everywhere = 0.0
     for channel in comparison.channels:
         if channel.instrument not in reached:

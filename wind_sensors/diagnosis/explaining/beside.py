@@ -21,7 +21,7 @@ from wind_sensors.diagnosis.explaining.fitting import Fit
 from wind_sensors.diagnosis.explaining.onsets import window_starts
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted, reached_by
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 LATER_CANDIDATES = 6
@@ -167,12 +167,11 @@ def _hidden_beside(searcher: Searcher, whitener: Whitener, current: Fit) -> list
         whitener: The null of the terms so far.
         current: The terms so far.
     """
-    comparison, station = searcher.comparison, searcher.station
-    reached = {n for t in current.terms for n in comparison.affected(station, t.instrument)}
-    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
+    comparison = searcher.comparison
+    reached = reached_by(comparison, searcher.station, current.terms)
     starts = [
         start
-        for name, instrument in sorted(possible)
+        for name, instrument in sorted(searcher.applicable)
         if instrument in reached
         and searcher.effects[name].smooths
         and searcher.effects[name].entrance != "clock"
@@ -182,7 +181,7 @@ def _hidden_beside(searcher: Searcher, whitener: Whitener, current: Fit) -> list
 
     def promise(start: Term) -> float:
         terms = [*current.terms, start]
-        simulated = comparison.possible(planted(station, terms))
+        simulated = comparison.possible(planted(searcher.station, terms))
         if simulated is None:
             return -np.inf
         null = searcher.whitener(simulated, current)

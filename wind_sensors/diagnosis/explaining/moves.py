@@ -46,7 +46,7 @@ from wind_sensors.diagnosis.explaining.fitting import (
 )
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER, Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, reached_by
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 MERGE_CANDIDATES = 8
@@ -438,7 +438,7 @@ def _in_place_of(
         known: Terms that did well before.
     """
     comparison, station = searcher.comparison, searcher.station
-    reached = set(comparison.affected(station, term.instrument))
+    reached = reached_by(comparison, station, [term])
     suggested = searcher.single_candidates(whitener, without.vector, SWAP_CANDIDATES)
     found = {starts[0].key: starts for starts in suggested}
     if without.terms:
@@ -452,7 +452,7 @@ def _in_place_of(
     return [
         starts
         for key, starts in found.items()
-        if key != term.key and reached & set(comparison.affected(station, key[1]))
+        if key != term.key and reached & reached_by(comparison, station, starts[:1])
     ]
 
 
@@ -461,8 +461,7 @@ def _mistaken_for(searcher: Searcher, term: Term) -> list[list[Term]]:
     starts: dict[tuple[str, str], list[Term]] = {}
     for template in searcher.bank.templates:
         effect = template.effect
-        confusable = effect.name in term.effect.confusable or term.effect.name in effect.confusable
-        if confusable and not effect.legible:
+        if effect.is_confusable_with(term.effect) and not effect.legible:
             start = Term(effect, template.instrument, dict(template.values), term.interval)
             starts.setdefault(start.key, []).append(start)
     return list(starts.values())

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing.observing import Simulated
 from wind_sensors.diagnosis.effects.definition import PLATFORM, Parameter
-from wind_sensors.diagnosis.explaining.terms import Interval, Term, planted
+from wind_sensors.diagnosis.explaining.terms import Interval, Term, planted, reached_by
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.station.model import Station
@@ -86,13 +86,9 @@ class Problem:
         self._station = station
         self._terms = tuple(terms)
         self._rest = rest
-        comparison = whitener.comparison
         self._only: tuple[str, ...] = ()
         if rest is not None:
-            touched = {
-                name for term in terms for name in comparison.affected(station, term.instrument)
-            }
-            self._only = tuple(sorted(touched))
+            self._only = tuple(sorted(reached_by(whitener.comparison, station, terms)))
         self.parameters = [p for _, p in parameters_of(terms)]
         self.low, self.high = _bounds(whitener, terms)
         self.scale = np.array([p.difference for p in self.parameters])

@@ -40,7 +40,7 @@ from wind_sensors.diagnosis.explaining.onsets import (
 )
 from wind_sensors.diagnosis.explaining.search import Searcher
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, reached_by
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 
 FIRST_CANDIDATES = 9
@@ -286,7 +286,7 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         passing: Explanations whose last effect begins or ends inside the record, best first.
     """
     *others, last = passing[0].fit.terms
-    reached = set(searcher.comparison.affected(searcher.station, last.instrument))
+    reached = reached_by(searcher.comparison, searcher.station, [last])
     newest = [one.fit.terms[-1] for one in passing]
     known = {term.key for term in newest if term.interval == last.interval}
     seen = [t.effect for t in newest if t.key in known and t.instrument == last.instrument]
@@ -295,13 +295,10 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         for key, guesses in searcher.guesses.items()
         if key[0] in BLIND_IN_PARTS
     }
-    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
     for effect in searcher.effects.values():
         key = (effect.name, last.instrument)
-        confusable = any(
-            effect.name in other.confusable or other.name in effect.confusable for other in seen
-        )
-        if confusable and key in possible and key not in starts and not effect.legible:
+        confusable = any(effect.is_confusable_with(other) for other in seen)
+        if confusable and key in searcher.applicable and key not in starts and not effect.legible:
             drive = searcher.comparison.drive
             starts[key] = [
                 Term(effect, key[1], effect.begun(values, drive)) for values in effect.templates
@@ -310,7 +307,7 @@ def blind_starts(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Ter
         [replace(start, interval=last.interval) for start in of_one]
         for key, of_one in starts.items()
         if key not in known
-        and reached & set(searcher.comparison.affected(searcher.station, key[1]))
+        and reached & reached_by(searcher.comparison, searcher.station, of_one[:1])
         and may_join(of_one[0], others)
     ]
 
@@ -352,13 +349,13 @@ def _fuller(searcher: Searcher, passing: Sequence[Judged]) -> list[list[Term]]:
 
     Of several effects that begin at the same time the simplest is screened first.
     """
-    possible = {(t.effect.name, t.instrument) for t in searcher.bank.templates}
     found: dict[tuple[str, str], list[Term]] = {}
     for one in passing:
         *others, last = one.fit.terms
         for effect in searcher.effects.values():
             key = (effect.name, last.instrument)
-            if last.effect.name not in effect.contains or key not in possible or key in found:
+            possible = last.effect.name in effect.contains and key in searcher.applicable
+            if not possible or key in found:
                 continue
             shared = {p.name: last.values[p.name] for p in effect.parameters
                       if p.name in last.values}

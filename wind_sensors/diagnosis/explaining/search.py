@@ -34,7 +34,7 @@ from wind_sensors.diagnosis.explaining.signatures import (
     templates_of,
     with_larger,
 )
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted, reached_by
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.calibrated_range import calm_share
 from wind_sensors.diagnosis.healthy.reference_lag import lag_weights, misplaced
@@ -133,6 +133,11 @@ class Searcher:
     def station(self) -> Station:
         """The station as commissioned."""
         return self.baseline.station
+
+    @cached_property
+    def applicable(self) -> frozenset[tuple[str, str]]:
+        """Effects of the catalogue, each with an instrument of this station that can have it."""
+        return frozenset((t.effect.name, t.instrument) for t in self.bank.templates)
 
     @cached_property
     def falling_silent(self) -> Station:
@@ -276,13 +281,7 @@ class Searcher:
             station = planted(self.station, [*fixed, start])
             only: tuple[str, ...] = ()
             if rest is not None:
-                only = tuple(
-                    {
-                        n
-                        for t in [*fixed, start]
-                        for n in comparison.affected(self.station, t.instrument)
-                    }
-                )
+                only = tuple(sorted(reached_by(comparison, self.station, [*fixed, start])))
             simulated = comparison.possible(station, only, rest)
             if simulated is None:
                 continue
@@ -331,12 +330,8 @@ class Searcher:
 
     def is_apart(self, current: Fit, start: Term) -> bool:
         """Whether a term acts on signals that those of a fit do not reach."""
-        reached = {
-            name
-            for term in current.terms
-            for name in self.comparison.affected(self.station, term.instrument)
-        }
-        return not reached & set(self.comparison.affected(self.station, start.instrument))
+        reached = reached_by(self.comparison, self.station, current.terms)
+        return not reached & reached_by(self.comparison, self.station, [start])
 
     def fit_beside(self, whitener: Whitener, current: Fit, start: Term) -> Fit:
         """Fit of one more term on signals of its own, the others as they are.

@@ -109,6 +109,19 @@ def planted(station: Station, terms: Sequence[Term]) -> Station:
     return station
 
 
+def reached_by(comparison: Comparison, station: Station, terms: Sequence[Term]) -> frozenset[str]:
+    """Instruments whose signals any of some terms can change.
+
+    Args:
+        comparison: The recording.
+        station: As commissioned.
+        terms: Some terms.
+    """
+    return frozenset(
+        name for term in terms for name in comparison.affected(station, term.instrument)
+    )
+
+
 def of_one_equation(terms: Sequence[Term]) -> bool:
     """Whether terms are constants of one linear equation of one instrument, which tells each.
 

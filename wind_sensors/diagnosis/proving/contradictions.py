@@ -22,6 +22,7 @@ from wind_sensors.diagnosis.explaining.terms import (
     Term,
     of_one_equation,
     planted,
+    reached_by,
 )
 from wind_sensors.diagnosis.healthy.whitening import in_series
 from wind_sensors.station.model import Cup, Propeller, Station
@@ -199,14 +200,10 @@ def varies(naming: Naming, station: Station) -> bool:
     comparison = null.comparison
     left = null.of(naming.fit.simulated)
     share = VARIES_SHARE * naming.gain
-    inexact = {
-        name
-        for term in naming.fit.terms
-        if not term.effect.exact
-        for name in comparison.affected(comparison.station, term.instrument)
-    }
+    uncertain = [term for term in naming.fit.terms if not term.effect.exact]
+    inexact = reached_by(comparison, comparison.station, uncertain)
     for term in naming.fit.terms:
-        alike = inexact & set(comparison.affected(comparison.station, term.instrument))
+        alike = inexact & reached_by(comparison, comparison.station, [term])
         if term.effect.noisy or not term.effect.exact or alike:
             continue
         without = _without(naming, station, term)

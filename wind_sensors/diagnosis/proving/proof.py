@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.diagnosis.comparing import spectra
 from wind_sensors.diagnosis.explaining.signatures import in_parallel
-from wind_sensors.diagnosis.explaining.terms import Term, planted, simulated_with
+from wind_sensors.diagnosis.explaining.terms import Term, planted, reached_by, simulated_with
 from wind_sensors.diagnosis.healthy.whitening import Whitener
 from wind_sensors.diagnosis.proving.held_out import (
     Fold,
@@ -159,7 +159,7 @@ def _acting(
 def _reached(whitener: Whitener, terms: Sequence[Term]) -> FloatArray:
     """One for what is compared of signals that effects reach, nought for the rest, shape (l,)."""
     comparison = whitener.comparison
-    names = {n for t in terms for n in comparison.affected(comparison.station, t.instrument)}
+    names = reached_by(comparison, comparison.station, terms)
     reached = np.array([float(c.instrument in names) for c in comparison.channels])
     return np.asarray(reached[comparison.channel_of_each])
 

@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.acceptance import LOUDEST_FACTOR
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import window_of
-from wind_sensors.diagnosis.explaining.terms import simulated_with
+from wind_sensors.diagnosis.explaining.terms import reached_by, simulated_with
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.noise_level import Excess
 from wind_sensors.diagnosis.regions import Region, RegionBank
@@ -171,15 +171,11 @@ def _largest(
     return float(scores[worst]), float(scores[worst] / limits[worst])
 
 
-def with_own_noise(naming: Naming) -> set[str]:
+def with_own_noise(naming: Naming) -> frozenset[str]:
     """Instruments whose named effects leave noise of their own."""
     comparison = naming.whitener.comparison
-    return {
-        instrument
-        for term in naming.fit.terms
-        if term.leaves_noise
-        for instrument in comparison.affected(comparison.station, term.instrument)
-    }
+    noisy = [term for term in naming.fit.terms if term.leaves_noise]
+    return reached_by(comparison, comparison.station, noisy)
 
 
 def unstirred(naming: Naming, station: Station) -> Comparison | None:

@@ -7,7 +7,7 @@ import math
 from wind_sensors.diagnosis.comparing.comparison import Comparison
 from wind_sensors.diagnosis.explaining.moments import needs_to_be_steady
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_FURTHER_PARAMETER
-from wind_sensors.diagnosis.explaining.terms import ALWAYS, of_one_equation
+from wind_sensors.diagnosis.explaining.terms import ALWAYS, of_one_equation, reached_by
 from wind_sensors.diagnosis.proving.findings import Finding
 
 SHOWN_P = 0.05
@@ -84,7 +84,7 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     own = [f for f in findings if f.proof is not None]
     if len(own) < 2:
         return False
-    reached = [set(comparison.affected(comparison.station, f.term.instrument)) for f in own]
+    reached = [reached_by(comparison, comparison.station, [f.term]) for f in own]
     for k, f in enumerate(own):
         alone = not reached[k] & set().union(*reached[:k], *reached[k + 1 :])
         quick = f.term.effect.is_quick and f.term.interval == ALWAYS
@@ -103,7 +103,7 @@ def made_up(findings: tuple[Finding, ...], comparison: Comparison, gain: float) 
     if of_one_equation([f.term for f in own]):
         return False
     delayed = any(f.term.effect.entrance == "clock" and f.gain > SURE_BESIDE_GAIN for f in own)
-    if delayed or not set.intersection(*reached) or any(_is_counted(f) for f in own):
+    if delayed or not frozenset.intersection(*reached) or any(_is_counted(f) for f in own):
         return False
     brought = sum(f.gain for f in own)
     single = max(gain - (brought - f.gain) for f in own)
