@@ -60,6 +60,13 @@ def test_the_catalogue_has_every_identifier() -> None:
     assert set(catalogue()) >= IDENTIFIERS
 
 
+def test_a_sector_lies_where_parameters_say() -> None:
+    sectored = {name: effect for name, effect in catalogue().items() if effect.sector}
+    assert {"wake_shadow", "potentiometer_gap"} <= set(sectored)
+    for effect in sectored.values():
+        assert {effect.sector, "width"} <= {p.name for p in effect.parameters}
+
+
 def test_every_effect_has_a_place_in_a_station_with_everything() -> None:
     assert {effect.name for effect, _ in _placed()} >= IDENTIFIERS
 

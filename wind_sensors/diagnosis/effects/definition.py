@@ -108,6 +108,11 @@ class Effect:
             that leans is an axis that leans.
         occasional: It acts in one sector, one lull or one part of the record; others show again
             and again.
+        sector: Name of the parameter with the middle of the one sector [deg] outside of which it
+            does nothing, whose width is the parameter `width`; empty: it acts in wind from
+            anywhere.
+        silences: It holds a signal still, or stops it, whatever the wind does.
+        brakes: It may hold a rotor that the wind hardly turns, so that it seems silent.
         smooths: It damps or delays what the wind does. Errors of the reference that come and go
             look like that, so a beginning or an end inside the record needs more evidence.
         shifts: Of those that smooth: it moves the mean of the signal as well.
@@ -162,6 +167,9 @@ class Effect:
     contains: frozenset[str] = frozenset()
     includes: frozenset[str] = frozenset()
     occasional: bool = False
+    sector: str = ""
+    silences: bool = False
+    brakes: bool = False
     smooths: bool = False
     shifts: bool = False
     exact: bool = False

@@ -217,6 +217,7 @@ STUCK_SENSOR = Effect(
     region="one interval of time",
     standing=0.0,
     occasional=True,
+    silences=True,
     parameters=(
         Parameter("start", "s", -1.0, 1e6, healthy=None, step=0.2, value_from="signals"),
         Parameter("stop", "s", 0.0, 1e6, healthy=None, step=0.2, value_from="signals"),

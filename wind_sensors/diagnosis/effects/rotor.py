@@ -96,6 +96,7 @@ BEARING_FRICTION = Effect(
     source="J80, eqs. (5), (6)",
     region="low speeds; the rotor stalls below U_s",
     occasional=True,
+    brakes=True,
     parameters=(
         Parameter(
             "friction_speed", "m/s", 0.0, 6.0, minimum=0.3, step=0.1, starts=(0.5, 1.0, 2.0)

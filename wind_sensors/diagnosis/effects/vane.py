@@ -296,6 +296,7 @@ POTENTIOMETER_GAP = Effect(
     region="one narrow sector of headings",
     standing=0.0,
     occasional=True,
+    sector="centre",
     parameters=(
         Parameter("centre", "deg", -540.0, 540.0, healthy=None, step=0.5, wraps=360.0),
         Parameter(

@@ -46,6 +46,7 @@ WAKE_SHADOW = Effect(
     region="a sector of wind directions, all speeds",
     standing=0.06,
     occasional=True,
+    sector="bearing_from",
     stirs=True,
     parameters=(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),

@@ -368,8 +368,8 @@ def is_a_stall(searcher: Searcher, current: Fit, start: Term) -> bool:
 
     A bearing that sticks lets go later than the simulated friction does.
     """
-    braked = any(t.effect.name == "bearing_friction" for t in current.terms)
-    if start.effect.name != "stuck_sensor" or not braked:
+    braked = any(t.effect.brakes for t in current.terms)
+    if not start.effect.silences or not braked:
         return False
     comparison = searcher.comparison
     for channel in comparison.channels:

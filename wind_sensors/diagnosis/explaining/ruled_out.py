@@ -95,9 +95,9 @@ def _hears_too_soon(comparison: Comparison, term: Term) -> bool:
 
     Args:
         comparison: The recording.
-        term: Any effect; only lost pulses are asked.
+        term: Any effect; only one with a dead time is asked.
     """
-    if term.effect.name != "missed_pulses" or term.values["dead_time"] <= 0.0:
+    if term.values.get("dead_time", 0.0) <= 0.0:
         return False
     intervals, _ = _while_it_holds(comparison, term)
     too_soon = np.count_nonzero(intervals < TOO_SOON * term.values["dead_time"])
@@ -112,11 +112,11 @@ def _is_silent(
     Args:
         comparison: The recording.
         station: As commissioned.
-        term: Any effect; only lost pulses are asked.
+        term: Any effect; only pulses lost by chance are asked.
         terms: All effects: another one on the same rotor may be what silences it.
     """
     alone = sum(t.instrument == term.instrument for t in terms) == 1
-    if term.effect.name != "missed_pulses" or not alone:
+    if "loss_probability" not in term.values or not alone:
         return False
     intervals, ends = _while_it_holds(comparison, term)
     if not intervals.size or intervals.max() < SHORTEST_SILENCE:
@@ -142,8 +142,7 @@ def _reports(comparison: Comparison, term: Term) -> bool:
         comparison: The recording.
         term: Any effect; only a velocity taken from the positions is asked.
     """
-    from_positions = term.values.get("position_share", 0.0)
-    if term.effect.name != "platform_velocity" or from_positions < FROM_POSITIONS:
+    if term.values.get("position_share", 0.0) < FROM_POSITIONS:
         return False
     if not log_is_dead(comparison.drive):
         return False

@@ -142,8 +142,8 @@ class Searcher:
     @cached_property
     def falling_silent(self) -> Station:
         """The station with the outages that its signals tell."""
-        told = (terms for key, terms in self.guesses.items() if key[0] == "stuck_sensor")
-        return planted(self.station, list(chain.from_iterable(told)))
+        told = chain.from_iterable(self.guesses.values())
+        return planted(self.station, [term for term in told if term.effect.silences])
 
     def whitener(self, simulated: Simulated, named: Fit | None = None) -> Whitener:
         """The null seen from the best simulation so far.

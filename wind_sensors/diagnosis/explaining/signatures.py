@@ -86,15 +86,10 @@ def entries(station: Station) -> Iterator[str]:
 
 def _visited(comparison: Comparison, effect: Effect, values: Mapping[str, float]) -> bool:
     """Whether the wind ever comes from where a directional template acts."""
-    width = values.get("width", 0.0)
-    if effect.name == "wake_shadow":
-        towards = values["bearing_from"]
-    elif effect.name == "potentiometer_gap":
-        towards = values["centre"]
-    else:
+    if not effect.sector:
         return True
-    away = np.angle(np.exp(1j * (comparison.wind_from - np.radians(towards))))
-    return bool(np.mean(np.abs(away) < np.radians(width)) > _SECTOR_SHARE)
+    away = np.angle(np.exp(1j * (comparison.wind_from - np.radians(values[effect.sector]))))
+    return bool(np.mean(np.abs(away) < np.radians(values["width"])) > _SECTOR_SHARE)
 
 
 def templates_of(
