@@ -128,6 +128,8 @@ class Case:
 def first_look(case: Case) -> Verdict:
     """The verdict on an explanation, before its findings are proved one by one.
 
+    What needs a calibration is neither named nor excluded in winds that none covers.
+
     Args:
         case: It.
     """
