@@ -38,6 +38,8 @@ class Parameter:
         tied: Value at which it is held where `free` says no; None: the healthy one.
         swing: Smallest change of the air's temperature, while the effect holds, that the parameter
             needs [K]; with less it keeps its healthy value.
+        limited: Whether nothing reaches its bounds, though no smallest size is its own: what asks
+            for so much is something else.
         spare: Whether the effect is often there without it: it keeps its healthy value where the
             recording does not ask for another.
         value_from: The `fit`; the `signals`, which tell it better than a fit can; or several
@@ -55,6 +57,7 @@ class Parameter:
     step: float = 0.0
     wraps: float = 0.0
     swing: float = 0.0
+    limited: bool = False
     spare: bool = False
     free: Callable[[Drive], bool] | None = None
     tied: float | None = None

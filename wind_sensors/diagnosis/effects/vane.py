@@ -191,11 +191,11 @@ VANE_IMBALANCE = Effect(
         ),
         Parameter(
             "tilt_x", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.04, starts=(0.8, -0.8),
-            free=_has_no_attitude,
+            limited=True, free=_has_no_attitude,
         ),
         Parameter(
             "tilt_y", "deg", -MOST_LEAN_DEG, MOST_LEAN_DEG, step=0.04, starts=(0.8, -0.8),
-            free=_has_no_attitude,
+            limited=True, free=_has_no_attitude,
         ),
     ),
     applies=is_vane,

@@ -31,7 +31,7 @@ def _is_at_bound(parameter: Parameter, value: float) -> bool:
             beyond |= value < parameter.low + margin
         # A wake as wide as half the horizon is none, nor does a flow past a mast bend more.
         return beyond and not parameter.wraps and parameter.value_from == "fit"
-    if not parameter.graded or parameter.minimum <= 0.0:
+    if not parameter.graded or not (parameter.minimum > 0.0 or parameter.limited):
         return False
     if parameter.healthy == 1.0 and value > 1.0 + _REACH * (parameter.high - 1.0):
         return True
