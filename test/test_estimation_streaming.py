@@ -23,7 +23,7 @@ from wind_sensors.estimation.core import Estimates
 from wind_sensors.estimation.kalman import KalmanCore
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Station
-from wind_sensors.station.signals import Angles, Recording, Winds
+from wind_sensors.station.signals import Angles, Pulses, Recording, Winds
 
 SETTINGS = EstimatorSettings(window=20.0)
 
@@ -302,6 +302,20 @@ def test_what_was_never_heard_makes_no_wind(recording: Recording, silent: str, w
     estimator.flush()
     assert not estimator.take_estimates()
     assert not [w for w in estimator.take_windows() if w.complete > 0.0]
+
+
+def test_means_are_refused_stated_or_not(recording: Recording) -> None:
+    info = recording.station.recording.model_copy(update={"averaging_time": 600.0})
+    station = recording.station.model_copy(update={"recording": info})
+    with pytest.raises(UserError, match="means over 600 s.*`wind diagnose` compares means"):
+        make_estimator(station)
+    time = recording.start + np.arange(30, dtype=np.int64) * 600_000_000_000
+    rows = replace(
+        recording, pulses={"cup": Pulses(time, np.arange(30.0))},
+        angles={"vane": Angles(time, np.zeros(30))},
+    )  # fmt: skip
+    with pytest.raises(UserError, match="29 of 30 stamps .*usually 600 s.*averaging_time"):
+        process(rows)
 
 
 def test_a_vane_that_comes_late_starts_the_estimate(recording: Recording) -> None:

@@ -20,7 +20,8 @@ TimeArray = npt.NDArray[np.int64]
 PULSES, READINGS, PLATFORM, TEMPERATURE, PRESSURE = range(5)
 _CONFIRMED = 3
 """So many messages in a row make a jump of the clock believable."""
-_FAR_AHEAD_NS = 60_000_000_000
+FAR_AHEAD_NS = 60_000_000_000
+"""A stamp further ahead of all others is not believed [ns]."""
 _INTERVALS_AHEAD = 1.5
 """So many intervals between states of the platform are waited for, so that one may be missing."""
 
@@ -147,7 +148,7 @@ class Intake:
             self.watermark = self._earliest = self._true(name, stamp)
         time = self._true(name, stamp)
         ahead = time - self.watermark
-        if ahead < -self._jump or ahead > _FAR_AHEAD_NS:
+        if ahead < -self._jump or ahead > FAR_AHEAD_NS:
             return self._is_jump(name, stamp, value)
         self._astray.clear()
         if ahead > 0:
@@ -162,7 +163,7 @@ class Intake:
 
     def advance(self, time: int) -> None:
         """Time has passed although no message came."""
-        if self._seen and time > self.watermark and time - self.watermark < _FAR_AHEAD_NS:
+        if self._seen and time > self.watermark and time - self.watermark < FAR_AHEAD_NS:
             self.watermark = time
 
     def _is_jump(self, name: str, stamp: int, value: tuple[float, ...]) -> bool:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.estimation.constants import axes_of, rotors_of
+from wind_sensors.estimation.intake import FAR_AHEAD_NS
 from wind_sensors.estimation.outputs import ProcessedRecording
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.streaming import StreamingEstimator, make_estimator
@@ -137,6 +138,28 @@ def _must_tell_a_vector(recording: Recording) -> None:
             )
 
 
+def _must_follow_one_another(recording: Recording) -> None:
+    """Refuse signals of which most would be taken for implausible stamps.
+
+    Raises:
+        UserError: More than half of the instants come later than `FAR_AHEAD_NS` after the one
+            before.
+    """
+    stamps = [p.time for p in recording.pulses.values()]
+    stamps += [a.time for a in recording.angles.values()]
+    step = np.diff(np.unique(np.concatenate(stamps)))
+    apart = int(np.count_nonzero(step > FAR_AHEAD_NS))
+    if apart > 0.5 * step.size:
+        raise UserError(
+            f"{apart} of {step.size + 1} stamps come more than {FAR_AHEAD_NS * 1e-9:g} s after the "
+            f"one before (usually {np.median(step) * 1e-9:g} s); the filter needs pulses or "
+            "samples.",
+            recording.name,
+            "If the messages are means, state `recording: {averaging_time: SECONDS}` in the "
+            "station file; `wind diagnose` compares means.",
+        )
+
+
 def process(
     recording: Recording,
     settings: EstimatorSettings | None = None,
@@ -153,7 +176,8 @@ def process(
         All estimates, windows and the health at the end.
 
     Raises:
-        UserError: The station lacks a rotor or a vane, or the recording has no signals of them.
+        UserError: The station lacks a rotor or a vane, the recording has no signals of them, or
+            they are means and no samples.
     """
     chosen = settings if settings is not None else EstimatorSettings()
     estimator = make_estimator(recording.station, chosen)
@@ -162,6 +186,7 @@ def process(
     if total == 0:
         raise UserError("The recording has no signals of its station.", recording.name)
     _must_tell_a_vector(recording)
+    _must_follow_one_another(recording)
     for done, (feed, index) in enumerate(_in_order(inputs, round(chosen.jump_time * 1e9))):
         feed(index)
         if done % 4096 == 0 and progress is not None:

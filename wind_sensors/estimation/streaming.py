@@ -119,10 +119,18 @@ class StreamingEstimator:
         settings: How to estimate.
 
     Raises:
-        UserError: The station's instruments cannot tell a wind vector.
+        UserError: The station's instruments cannot tell a wind vector, or its messages are means.
     """
 
     def __init__(self, station: Station, settings: EstimatorSettings) -> None:
+        averaged = station.recording.averaging_time
+        if averaged > 0.0:
+            raise UserError(
+                f"the station's messages are means over {averaged:g} s; the filter needs pulses or "
+                "samples.",
+                "recording.averaging_time",
+                "`wind diagnose` compares means.",
+            )
         if not is_array(station) and not (rotors_of(station) and axes_of(station)):
             raise UserError(
                 "An estimate of the wind needs a cup or propeller with a vane or bivane, or fixed "
@@ -357,6 +365,6 @@ def make_estimator(
         settings: Method, rates, windows; None: the defaults.
 
     Raises:
-        UserError: The station's instruments cannot tell a wind vector.
+        UserError: The station's instruments cannot tell a wind vector, or its messages are means.
     """
     return StreamingEstimator(station, settings if settings is not None else EstimatorSettings())
