@@ -307,14 +307,14 @@ def test_what_was_never_heard_makes_no_wind(recording: Recording, silent: str, w
 def test_means_are_refused_stated_or_not(recording: Recording) -> None:
     info = recording.station.recording.model_copy(update={"averaging_time": 600.0})
     station = recording.station.model_copy(update={"recording": info})
-    with pytest.raises(UserError, match="means over 600 s.*`wind diagnose` compares means"):
+    with pytest.raises(UserError, match=r"means over 600 s.*`wind diagnose` compares means"):
         make_estimator(station)
     time = recording.start + np.arange(30, dtype=np.int64) * 600_000_000_000
     rows = replace(
         recording, pulses={"cup": Pulses(time, np.arange(30.0))},
         angles={"vane": Angles(time, np.zeros(30))},
     )  # fmt: skip
-    with pytest.raises(UserError, match="29 of 30 stamps .*usually 600 s.*averaging_time"):
+    with pytest.raises(UserError, match=r"29 of 30 stamps .*usually 600 s.*averaging_time"):
         process(rows)
 
 

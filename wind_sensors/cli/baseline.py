@@ -7,9 +7,9 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.comparing.reference_place import Place
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.healthy.learning import complete, default_baseline, learn
@@ -121,7 +121,7 @@ def learnt(
     for recording in recordings:
         if all(recording is not other for other in kept):
             progress.console.print(
-                f"{recording.name} is left out: an instrument says nothing in it", highlight=False
+                f"{recording.name} is left out: an instrument says nothing in it"
             )
     learning = progress.add_task("learning what is normal", total=1.0)
     return learn(
@@ -167,7 +167,7 @@ def run(options: argparse.Namespace) -> int:
     if options.output.is_dir():
         raise UserError("this is a folder.", str(options.output), "Name a file with -o.")
     check_writable(options.output.parent)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=screen(stderr=True), transient=True) as progress:
         baseline = learnt(options.recordings, options.station, progress)
     with refused_in_words(options.output, "baseline"):
         options.output.parent.mkdir(parents=True, exist_ok=True)

@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
 from wind_sensors.cli.baseline import learnt, read_baseline
 from wind_sensors.cli.diagnose import print_notes
+from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.comparing.preparing import prepare
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.search import searcher_of
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     make_way(options.output, NAMES, inputs=inputs, force=options.force)
     if options.baseline is not None and options.healthy:
         raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=screen(stderr=True), transient=True) as progress:
         recording = read_recording(options.recording, options.station)
         if options.baseline is not None:
             baseline = read_baseline(options.baseline, recording.station)
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
         p = bank.p_value(found[0].score)
         with refused_in_words(options.output):
             written = write(options.output, comparison, simulated, found, p)
-    console = Console()
+    console = screen()
     table = Table(box=None)
     for column in ("channel", "mean residual", "rms residual"):
         table.add_column(column)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
+from wind_sensors.cli.screen import screen
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         )
         return made[0].nodes()
 
-    console = Console()
+    console = screen()
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

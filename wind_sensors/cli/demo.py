@@ -9,8 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from wind_sensors.cli.screen import screen
 
 if TYPE_CHECKING:
     from wind_sensors.estimation import EstimatorSettings
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.report.demo_results import demo_results
     from wind_sensors.report.live_agreement import live_agreement, shortfalls
 
-    console = Console()
+    console = screen()
     folder = Path(args.output)
     _make_room(folder, force=args.force)
     _write_station(folder / STATION_FILE)
@@ -120,11 +121,11 @@ def run(args: argparse.Namespace) -> int:
             f"{agreement.largest_difference:g}"
         )
         for sentence in shortfalls(agreement, args.rate):
-            console.print(sentence, style="bold red", highlight=False)
+            console.print(sentence, style="bold red")
     else:
         console.print("no rclpy here, so the live graph was left out")
     for written in (folder / RECORDING, folder / PROCESSED, page):
-        console.print(f"wrote {written}", soft_wrap=True)
+        print(f"wrote {written}")
     return 0 if agreement is None or (agreement.is_exact and agreement.is_complete) else 1
 
 

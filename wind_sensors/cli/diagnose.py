@@ -9,9 +9,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.table import Table
+from rich.text import Text
 
 from wind_sensors.cli.baseline import learnt, read_baseline, workers
 from wind_sensors.cli.other_references import diagnose_otherwise, other_reference
+from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
@@ -58,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     make_way(options.output, inputs=inputs, force=options.force)
     if options.baseline is not None and options.healthy:
         raise UserError("both a baseline and healthy recordings are given.", "", "Give one.")
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=screen(stderr=True), transient=True) as progress:
         recording = read_recording(options.recording, options.station)
         if other_reference(recording):
             return diagnose_otherwise(options, recording, progress)
@@ -78,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
         diagnosis = diagnose(recording, baseline, effects, workers(), report)
         with refused_in_words(options.output):
             written = write(options.output, diagnosis, without=sorted(set(options.without)))
-    _print(Console(), diagnosis)
+    _print(screen(), diagnosis)
     if options.without:
         print(f"taken out of the catalogue: {', '.join(sorted(set(options.without)))}")
     for path in written:
@@ -106,16 +108,15 @@ def catalogue_without(names: Sequence[str]) -> dict[str, Effect]:
 def print_notes(console: Console, notes: Sequence[str]) -> None:
     """What reading a recording had to say."""
     for note in notes:
-        console.print(f"note: {note}", markup=False, highlight=False)
+        console.print(f"note: {note}")
 
 
 def _print(console: Console, diagnosis: Diagnosis) -> None:
     names = names_of(diagnosis.findings)
-    console.print(
-        f"[bold]{diagnosis.recording}[/bold]: {diagnosis.verdict}" + (f": {names}" if names else "")
-    )
+    verdict = f": {diagnosis.verdict}" + (f": {names}" if names else "")
+    console.print(Text.assemble((diagnosis.recording, "bold"), verdict))
     for silent in diagnosis.silent:
-        console.print(f"[bold red]silent[/bold red] {silent.words}", highlight=False)
+        console.print(Text.assemble(("silent", "bold red"), f" {silent.words}"))
     print_notes(console, diagnosis.comparison.recording.notes)
     if diagnosis.findings:
         table = Table(box=None)

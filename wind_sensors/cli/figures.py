@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import track
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.report.paper_figures import FIGURES, render
@@ -52,11 +52,11 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(
             "the file is already there.", str(present[0]), "Use --force to replace it."
         )
-    console = Console()
+    console = screen()
     with refused_in_words(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name in track(names, description="drawing", console=console, transient=True):
             render(name, targets[name])
     for path in targets.values():
-        console.print(f"wrote {path}")
+        print(f"wrote {path}")
     return 0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress
 
 from wind_sensors.cli.info import duration
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.importing import import_files, write_imported
 from wind_sensors.recordings.mapping import MappingFile, read_mapping
@@ -44,7 +44,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> int:
     """Import the files; 0 on success."""
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     keep_inputs(options.output, (*options.files, options.mapping))
     mapping_file = load_mapping(options.mapping)
     with Progress(console=console, transient=True) as progress:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
 from wind_sensors.recordings.mapping import mapping_markdown
@@ -48,7 +49,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(options: argparse.Namespace) -> int:
     """Print what is there; 0 on success."""
-    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
+    console = screen(plain_width=_PLAIN_WIDTH)
     if options.schema:
         print(schema_markdown() if options.schema == "station" else mapping_markdown(), end="")
         return 0
@@ -74,13 +75,14 @@ def run(options: argparse.Namespace) -> int:
     recording = signals_of(content, station, name_of(path), str(path))
     seconds = (recording.stop - recording.start) * 1e-9
     start = np.datetime_as_string(np.datetime64(recording.start, "ns"), unit="ms")
-    console.print(f"[bold]{recording.name}[/bold]  {start}Z, {duration(seconds)}")
+    when = f"  {start}Z, {duration(seconds)}"
+    console.print(Text.assemble((recording.name, "bold"), when))
     _print_topics(console, content, recording)
     _print_station(console, station)
     for note in recording.notes:
-        console.print(f"[yellow]note[/yellow] {note}", highlight=False)
+        console.print(Text.assemble(("note", "yellow"), f" {note}"))
     if not recording.notes:
-        console.print("nothing unusual in the signals", highlight=False)
+        console.print("nothing unusual in the signals")
     return 0
 
 

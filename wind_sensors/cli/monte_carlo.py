@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.report.monte_carlo import Row, run_monte_carlo, table_markdown
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     target = Path(args.output) if args.output else None
     if target is not None and target.exists() and not args.force:
         raise UserError("the file is already there.", str(target), "Use --force to replace it.")
-    console = Console()
+    console = screen()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("starting", total=len(standard_cases()))
@@ -58,12 +59,13 @@ def run(args: argparse.Namespace) -> int:
 
         rows = run_monte_carlo(args.pairs, args.seed, progress=tell)
     # One row, one line, also where the output is not a terminal.
-    Console(width=max(console.width, 130)).print(_table(rows))
+    console.width = max(console.width, 130)
+    console.print(_table(rows))
     if target is not None:
         with refused_in_words(target):
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(table_markdown(rows), encoding="utf-8")
-        console.print(f"wrote {target}")
+        print(f"wrote {target}")
     return 0 if all(row.passed for row in rows) else 1
 
 
@@ -81,6 +83,6 @@ def _table(rows: list[Row]) -> Table:
             f"{row.formula:.4f}",
             f"{row.difference:+.5f} ± {row.difference_error:.5f}",
             f"{row.allowed:.5f}",
-            "ok" if row.passed else "[red]outside[/red]",
+            "ok" if row.passed else Text("outside", "red"),
         )
     return table

@@ -8,8 +8,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress, TaskID
+from rich.text import Text
 
 from wind_sensors.cli.baseline import read_healthy
+from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
 from wind_sensors.diagnosis.means.healthy import learn_means
@@ -73,7 +75,7 @@ def diagnose_otherwise(
     with refused_in_words(options.output):
         written = write_outcome(options.output, outcome)
     progress.stop()
-    print_outcome(Console(), outcome)
+    print_outcome(screen(), outcome)
     for path in written:
         print(f"wrote {path}")
     return 0
@@ -105,25 +107,25 @@ def _of_means(
 
 def print_outcome(console: Console, outcome: Outcome) -> None:
     """Verdict and findings for people."""
-    console.print(f"[bold]{outcome.recording}[/bold]: {outcome.verdict}")
+    console.print(Text.assemble((outcome.recording, "bold"), f": {outcome.verdict}"))
     for f in outcome.findings:
         together = f" (one of set {f.set_number})" if f.set_number else ""
         console.print(
-            f"  [bold]{f.term.effect.name}[/bold] {f.term.instrument}{together}: "
-            f"{f.located.region.label}",
-            highlight=False,
+            Text.assemble(
+                "  ", (f.term.effect.name, "bold"),
+                f" {f.term.instrument}{together}: {f.located.region.label}",
+            )
         )
         if f.term.effect.name != "stuck_sensor":
             for key, e in f.parameters.items():
                 interval = f" ({e.low:.3g} to {e.high:.3g})" if np.isfinite(e.low) else ""
                 unit = "" if e.unit == "1" else f" {e.unit}"
-                console.print(f"    {key} {e.value:.3g}{unit}{interval}", highlight=False)
+                console.print(f"    {key} {e.value:.3g}{unit}{interval}")
         if f.proof is not None:
             console.print(
                 f"    removes {100.0 * f.proof.excess_removed:.0f} % "
                 f"({100.0 * f.proof.low:.0f} to {100.0 * f.proof.high:.0f} %) of the misfit on "
-                "held-out blocks",
-                highlight=False,
+                "held-out blocks"
             )
     if outcome.left_over:
         console.print(f"left over: {outcome.left_over}")

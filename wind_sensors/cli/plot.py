@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.reading import read_estimates, read_recording
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     if options.output.exists() and not options.output.is_dir():
         raise UserError("this is no folder.", str(options.output), "Choose another place with -o.")
     check_writable(options.output)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=screen(stderr=True), transient=True) as progress:
         task = progress.add_task("drawing", total=len(chosen) + 1)
         recording = without_doubles(read_recording(options.recording, options.station))
         found = read_estimates(options.recording)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.estimation import (
     METHODS,
@@ -24,10 +23,10 @@ from wind_sensors.estimation import (
     process,
 )
 from wind_sensors.estimation.constants import measures_vertical
-from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.recordings import write_recording
 from wind_sensors.recordings.bag import TopicData
 from wind_sensors.recordings.other_topics import OtherTopics
+from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import (
     bag_of,
     name_of,
@@ -36,16 +35,25 @@ from wind_sensors.recordings.reading import (
     station_topics,
 )
 from wind_sensors.recordings.writing import clear_target, keep_inputs
+from wind_sensors.report.window_table import (
+    TERMS,
+    Quantity,
+    bias_quantities,
+    told_terms,
+    wind_quantities,
+    windows_csv,
+)
 from wind_sensors.station.signals import Recording
 
-_TERMS = {
-    "u": "overspeeding (u)",
-    "v": "speed against vector mean (v)",
-    "w": "angular response (w)",
-    "vane_lag": "vane lag",
-    "translation": "propeller translation",
-    "arithmetic_mean": "arithmetic mean",
-}
+TABLE_FILE = "windows.csv"
+"""In the new recording: its averaging windows, for a spreadsheet."""
+_PLAIN_WIDTH = 120
+"""Of the tables where no terminal says its own."""
+_UNCERTAINTY = "±: standard uncertainty, one sigma (68 %)."
+_ARITHMETIC_MEAN = (
+    "arithmetic mean: by how much a mean over revolutions exceeds the mean over time; counted, so "
+    "without uncertainty."
+)
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -57,8 +65,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         description="Estimate the wind from a RECORDING's pulses and vane readings, and write a "
         "RECORDING whose bag carries the output topics (wind, wind/apparent, wind/mean, "
         "wind/bias, ...) beside the raw ones; topics that are not the station's are copied as "
-        "they are. The same estimator runs in the live nodes and gives the same numbers for the "
-        "same messages.",
+        f"they are. {TABLE_FILE} beside the bag has the averaging windows, for a spreadsheet. "
+        "Behind ± stands the standard uncertainty (one sigma). The same estimator runs in the live "
+        "nodes and gives the same numbers for the same messages.",
     )
     parser.add_argument(
         "recording", metavar="RECORDING", help="folder with recording.yaml and bag/, or a bag"
@@ -98,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     keep_inputs(args.output, (args.recording, args.station))
     if Path(args.output).exists() and not args.force:
         clear_target(Path(args.output), force=False)
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     if must_compile(settings):
         console.print("Compiling the estimator, once after an installation: about a minute.")
     with Progress(
@@ -117,9 +126,13 @@ def run(args: argparse.Namespace) -> int:
     folder = write_recording(
         args.output, recording, outputs=result, others=others, force=args.force
     )
-    out = Console(file=sys.stdout, width=None if sys.stdout.isatty() else 110)
-    _report(out, result, others.notes)
+    if result.windows:
+        with refused_in_words(folder):
+            (folder / TABLE_FILE).write_text(windows_csv(result), encoding="utf-8")
+    _report(screen(plain_width=_PLAIN_WIDTH), result, others.notes)
     print(f"wrote {folder}")
+    if result.windows:
+        print(f"wrote {folder / TABLE_FILE}")
     return 0
 
 
@@ -154,7 +167,7 @@ def _read(path: str, station_file: str | None) -> tuple[Recording, OtherTopics]:
 
 def _report(console: Console, result: ProcessedRecording, further: Sequence[str]) -> None:
     for note in (*result.recording.notes, *further):
-        console.print(f"note: {note}", highlight=False)
+        console.print(f"note: {note}")
     for item in result.health:
         if item.level != HealthLevel.OK:
             console.print(f"{item.level.name.lower()}: {item.name}: {item.message}")
@@ -164,62 +177,49 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
         console.print(f"No estimate: {reason}.")
         return
     start = result.recording.start
-    table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")
-    table.add_column("window [s]")
     with_vertical = measures_vertical(result.recording.station)
-    components = 3 if with_vertical else 2
-    turbulence = f"turbulence {', '.join('uvw'[:components])} [m/s]"
-    for heading in ("mean speed [m/s]", "vector mean [m/s]", "from [deg]", turbulence,
-                    "direction spread [deg]"):  # fmt: skip
+    components = "uvw" if with_vertical else "uv"
+    table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")
+    table.add_column("window\n[s]")
+    turbulence = f"turbulence {', '.join(components)}\n[m/s]"
+    for heading in ("mean speed\n[m/s]", "vector mean\n[m/s]", "from\n[deg]", turbulence,
+                    "direction spread\n[deg]"):  # fmt: skip
         table.add_column(heading, justify="right")
     if with_vertical:
-        table.add_column("upwards [m/s]", justify="right")
+        table.add_column("upwards\n[m/s]", justify="right")
     for window in result.windows:
-        lift = [_lift(window)] if with_vertical else []
-        table.add_row(*_cells(window, start, components), *lift)
+        found = {q.name: q for q in wind_quantities(window, with_vertical=with_vertical)}
+        table.add_row(
+            _span(window, start),
+            _told(found["mean speed"], ".3f"),
+            _told(found["vector mean"], ".3f"),
+            _told(found["from"], ".1f"),
+            ", ".join(_told(found[f"turbulence {name}"], ".2f") for name in components),
+            _told(found["direction spread"], ".1f"),
+            *([_told(found["upwards"], "+.3f")] if with_vertical else []),
+        )
     console.print(table)
+    terms = told_terms(result)
     biases = Table(title="bias of the raw mean speed [% of the mean speed]", title_justify="left")
     biases.add_column("window [s]")
-    for text in _TERMS.values():
-        biases.add_column(text, justify="right")
+    for term in terms:
+        biases.add_column(TERMS[term], justify="right")
     for window in result.windows:
-        biases.add_row(
-            _span(window, start),
-            *(
-                f"{100.0 * term.value:+.2f} ± {100.0 * term.uncertainty:.2f}"
-                for term in (window.bias_terms[name] for name in _TERMS)
-            ),
-        )
+        told = (_told(bias, "+.2f") for bias in bias_quantities(window, terms))
+        biases.add_row(_span(window, start), *told)
     console.print(biases)
+    console.print(_UNCERTAINTY)
+    if "arithmetic_mean" in terms:
+        console.print(_ARITHMETIC_MEAN)
 
 
 def _span(window: WindowStatistics, start: int) -> str:
     return f"{round((window.start - start) * 1e-9)} - {round((window.stop - start) * 1e-9)}"
 
 
-def _lift(window: WindowStatistics) -> str:
-    """Mean vertical wind with its uncertainty."""
-    deviation = math.sqrt(max(float(window.vector_mean_covariance[2, 2]), 0.0))
-    return f"{window.vector_mean[2]:+.3f} ± {deviation:.3f}"
-
-
-def _spread(window: WindowStatistics) -> str:
-    """Standard deviation of the wind's direction with its uncertainty [deg]."""
-    variance, by = window.corrected_direction_variance, window.direction_variance_uncertainty
-    least, spread, most = (math.sqrt(max(v, 0.0)) for v in (variance - by, variance, variance + by))
-    return f"{math.degrees(spread):.1f} ± {math.degrees(0.5 * (most - least)):.1f}"
-
-
-def _cells(window: WindowStatistics, start: int, components: int) -> list[str]:
-    """Mean, direction, turbulence of one window as text with uncertainties."""
-    east, north = float(window.vector_mean[0]), float(window.vector_mean[1])
-    along = math.sqrt(max(float(window.vector_mean_covariance[0, 0]), 0.0))
-    comes_from = float(direction_from_deg(window.vector_mean))
-    return [
-        _span(window, start),
-        f"{window.scalar_mean:.3f} ± {window.scalar_mean_uncertainty:.3f}",
-        f"{math.hypot(east, north):.3f} ± {along:.3f}",
-        f"{comes_from:.1f} ± {math.degrees(window.direction_uncertainty):.1f}",
-        ", ".join(f"{deviation:.2f}" for deviation in window.turbulence[:components]),
-        _spread(window),
-    ]
+def _told(quantity: Quantity, form: str) -> str:
+    """A number with its uncertainty, where it has one; the columns' headings tell the units."""
+    text = format(quantity.value, form)
+    if quantity.uncertainty is None:
+        return text
+    return f"{text} ± {format(quantity.uncertainty, form.lstrip('+'))}"

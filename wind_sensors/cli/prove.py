@@ -264,8 +264,9 @@ def _demo(arguments: argparse.Namespace) -> int:
 
 
 def _print_rates(rates: list[Rate]) -> None:
-    from rich.console import Console
     from rich.table import Table
+
+    from wind_sensors.cli.screen import screen
 
     table = Table("what", "rate", "95 % interval", "promised")
     for rate in rates:
@@ -278,7 +279,7 @@ def _print_rates(rates: list[Rate]) -> None:
                 rate.promised,
                 style="" if rate.met is not False else "bold",
             )
-    Console().print(table)
+    screen().print(table)
 
 
 def _read_key(given: str) -> bytes:

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import velocity_from_direction, yaw_from_compass
 from wind_sensors.recordings import load_station, read_recording, write_recording
@@ -190,7 +190,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     if args.seed < 0:
         raise UserError("The seed must not be negative.", "--seed", "Use 0 or more.")
     keep_inputs(args.output, (args.station, args.wind, args.follow))

@@ -1,0 +1,54 @@
+"""What `wind process` tells of its windows, on the screen and in `windows.csv`."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from test_cli import steady_recording
+
+from wind_sensors.cli.main import main
+from wind_sensors.recordings import write_recording
+
+NAIVE = ("--method", "naive", "--window", "60")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording whose folder and vane have names like the markup of a screen."""
+    recording = steady_recording()
+    cup, vane = recording.station.instruments
+    station = recording.station.model_copy(
+        update={"instruments": (cup, vane.model_copy(update={"name": "vane [north]"}))}
+    )
+    angles = {"vane [north]": recording.angles["vane"]}
+    folder = tmp_path_factory.mktemp("recorded") / "cal[red]m"
+    return write_recording(folder, replace(recording, station=station, angles=angles))
+
+
+def test_brackets_are_told_as_they_are(
+    tmp_path: Path, recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["process", str(recorded), "-o", str(tmp_path / "wind"), *NAIVE]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("cal[red]m, naive")
+    assert "[s]" in told and "[m/s]" in told and "[deg]" in told
+    assert "±: standard uncertainty" in told
+    assert "propeller" not in told, "a cup has no translation of its propeller"
+    assert main(["info", str(recorded)]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("cal[red]m ") and "vane [north] " in told
+
+
+def test_windows_are_a_table_for_spreadsheets(tmp_path: Path, recorded: Path) -> None:
+    assert main(["process", str(recorded), "-o", str(tmp_path / "wind"), *NAIVE]) == 0
+    with (tmp_path / "wind" / "windows.csv").open(encoding="utf-8", newline="") as file:
+        first, second = csv.DictReader(file)
+    assert first["start [UTC]"] == "2026-01-01T00:00:00.000Z"
+    assert first["stop [UTC]"] == second["start [UTC]"] == "2026-01-01T00:01:00.000Z"
+    assert float(first["mean speed [m/s]"]) == pytest.approx(8.0, rel=0.01)
+    assert float(first["from [deg]"]) == pytest.approx(270.0, abs=2.0)
+    assert float(first["standard uncertainty of mean speed [m/s]"]) > 0.0
+    assert "bias: speed against vector mean (v) [%]" in first
