@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -94,6 +95,25 @@ def test_bad_input_is_a_message_and_status_2(
     told = capsys.readouterr().err
     assert told.startswith("wind info: ") and "Traceback" not in told
     assert main(["info"]) == 2
+
+
+def test_an_interrupt_while_a_command_loads_is_no_traceback(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(name: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(front, "import_module", interrupted)
+    assert main(["info", "mast_cup_vane"]) == 130
+
+
+def test_a_reader_that_has_read_enough_is_no_failure() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "wind_sensors.cli", "info", "mast_cup_vane"]
+    asked = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (asked.returncode, asked.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize(

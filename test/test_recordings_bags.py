@@ -18,6 +18,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from wind_sensors.errors import UserError
 from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.bag import typestore
+from wind_sensors.recordings.reading import read_estimates
 from wind_sensors.station.model import (
     Input,
     Station,
@@ -118,6 +119,13 @@ def test_a_damaged_sqlite_bag_gives_what_is_left(tmp_path: Path) -> None:
     assert 0 < len(found) < len(time)
     assert np.array_equal(found, time[: len(found)])
     assert any("damaged" in note for note in after.notes)
+
+
+def test_a_cut_bag_without_a_topic_is_not_an_unreadable_one(small: Path) -> None:
+    file = next((small / "bag").glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[:-1000])
+    assert read_recording(small).pulses["cup"].time.size
+    assert read_estimates(small) is None
 
 
 def test_refusals_say_what_to_do(tmp_path: Path, small: Path) -> None:

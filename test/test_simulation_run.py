@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from wind_sensors.cli.main import main
 from wind_sensors.errors import UserError
-from wind_sensors.recordings import read_recording
+from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.simulation import (
     CARRIERS,
     Scenario,
@@ -349,6 +349,24 @@ def test_the_command_writes_what_was_simulated(
     assert main(command) == 2, "what is there is not overwritten"
     assert "--force" in capsys.readouterr().err
     assert main([*command, "--carrier", "boat", "--force"]) == 2, "a mast does not sail"
+
+
+def test_what_the_command_writes_can_be_compared(tmp_path: Path) -> None:
+    first, again, blown = (str(tmp_path / name) for name in ("first", "again", "blown"))
+    duration = ["--duration", "20s"]
+    assert main(["simulate", "mast_cup_vane", "-o", first, *duration]) == 0
+    found = read_recording(first)
+    assert found.reference is not None and found.truth is not None
+    assert np.array_equal(found.reference.velocity, found.truth.velocity)
+    assert len(drive_from_recording(found)) == 400
+    assert main(["simulate", f"{first}/recording.yaml", "-o", again, *duration]) == 0
+    repeated = read_recording(again)
+    assert np.array_equal(repeated.pulses["cup"].time, found.pulses["cup"].time)
+    bare = replace(found, station=found.station.model_copy(update={"reference": None}))
+    write_recording(first, bare, force=True)
+    with pytest.raises(UserError, match=r"Add `reference: {kind: truth, topic: /truth/wind}`"):
+        drive_from_recording(read_recording(first))
+    assert main(["simulate", "mast_cup_vane", "--wind", first, "-o", blown]) == 0
 
 
 def test_a_rate_that_would_fill_the_memory_is_refused(

@@ -69,7 +69,10 @@ def _run(commands: Mapping[str, str], chosen: str | None, given: Sequence[str]) 
             parser.print_help()
             return 0
         options = parser.parse_args(given)
-        return int(options.run(options))
+        status = int(options.run(options))
+        # A reader that has gone is met here and not at the end of the interpreter.
+        sys.stdout.flush()
+        return status
     except UserError as problem:
         print(f"wind {chosen}: {problem}", file=sys.stderr)
         return 2

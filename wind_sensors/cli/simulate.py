@@ -15,12 +15,14 @@ from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import velocity_from_direction, yaw_from_compass
 from wind_sensors.recordings import load_station, read_recording, write_recording
+from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
 from wind_sensors.recordings.writing import keep_inputs
 from wind_sensors.simulation.run import simulate
 from wind_sensors.simulation.scenario import Scenario, TransportFaults
 from wind_sensors.simulation.trajectories import CARRIERS, Trajectory
 from wind_sensors.simulation.transport import received
-from wind_sensors.station.model import Station
+from wind_sensors.station.inputs import absolute
+from wind_sensors.station.model import Input, Reference, Station
 from wind_sensors.station.signals import PlatformStates, Recording, Winds
 from wind_sensors.turbulence.synthesis import TurbulenceSpec, isotropic_spec, surface_layer_spec
 
@@ -93,8 +95,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "simulate",
         help="wind to signals: write the recording a station would make",
         description="Simulate a station in a turbulent wind and write its RECORDING, with the "
-        "true wind on /truth/wind. What is wrong with the station's instruments stands in the "
-        "station file. The same seed gives the same signals to the bit.",
+        f"true wind on {TRUTH_TOPIC}, which is the reference of a station that has no other. What "
+        "is wrong with the station's instruments stands in the station file. The same seed gives "
+        "the same signals to the bit.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument(
@@ -194,7 +197,7 @@ def run(args: argparse.Namespace) -> int:
     if args.seed < 0:
         raise UserError("The seed must not be negative.", "--seed", "Use 0 or more.")
     keep_inputs(args.output, (args.station, args.wind, args.follow))
-    station = load_station(args.station)
+    station = _without_truth(load_station(args.station))
     scenario = _scenario(args, station)
     begin = time.perf_counter()
     with Progress(
@@ -207,11 +210,28 @@ def run(args: argparse.Namespace) -> int:
             progress=lambda done: progress.update(task, completed=done),
         )  # fmt: skip
     spent = time.perf_counter() - begin
-    recording = received(recording, scenario.faults)
+    recording = _comparable(received(recording, scenario.faults))
     folder = write_recording(args.output, recording, force=args.force)
     print(_summary(recording, scenario.duration, spent))
     print(f"wrote {folder}")
     return 0
+
+
+def _without_truth(station: Station) -> Station:
+    """The station without a reference that is the truth, which every simulation writes anyway."""
+    reference = station.reference
+    if reference is None or absolute(reference.topic.topic) != TRUTH_TOPIC:
+        return station
+    return station.model_copy(update={"reference": None})
+
+
+def _comparable(recording: Recording) -> Recording:
+    """The recording with its true wind as reference, where its station has no other."""
+    station = recording.station
+    if station.reference is not None:
+        return recording
+    truth = Reference(kind="truth", topic=Input(topic=TRUTH_TOPIC))
+    return replace(recording, station=station.model_copy(update={"reference": truth}))
 
 
 def _scenario(args: argparse.Namespace, station: Station) -> Scenario:
@@ -254,10 +274,11 @@ def _wind(args: argparse.Namespace, station: Station) -> tuple[TurbulenceSpec | 
     duration = float(args.duration)
     if args.wind:
         measured = read_recording(args.wind)
-        if measured.reference is None or measured.reference.time.size < 2:
+        wind = measured.truth if measured.reference is None else measured.reference
+        if wind is None or wind.time.size < 2:
             raise UserError("The recording has no reference wind.", args.wind, "Name one that has.")
-        stamps = measured.reference.time
-        return measured.reference, min(duration, float(stamps.max() - stamps.min()) * 1e-9)
+        stamps = wind.time
+        return wind, min(duration, float(stamps.max() - stamps.min()) * 1e-9)
     towards = velocity_from_direction(1.0, args.direction_from)
     direction = math.atan2(float(towards[1]), float(towards[0]))
     if args.surface_layer:

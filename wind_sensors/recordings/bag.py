@@ -92,7 +92,7 @@ def read_bag(path: Path, wanted: Callable[[str], bool] = lambda topic: True) -> 
     except Exception as problem:
         # A bag can be broken in any way; what its reader raises then is not specified.
         content = _salvaged(path, wanted, problem)
-    if not any(data.raw for data in content.topics.values()):
+    if not any(data.count for data in content.topics.values()):
         reason = content.notes[0] if content.notes else "it holds no messages"
         raise UserError(
             f"the bag cannot be read: {reason}.",

@@ -230,6 +230,7 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
         temperature=temperature,
         pressure=pressure,
         truth=truth,
+        truth_topic=truth_topic or "",
         notes=tuple(reader.notes),
     )
 

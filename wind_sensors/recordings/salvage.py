@@ -208,8 +208,14 @@ def _salvage_sqlite(path: Path) -> Salvage:
             for key, time, raw in rows:
                 found.messages.append(SalvagedMessage(topics[key], int(time), bytes(raw)))
     except (sqlite3.Error, KeyError) as problem:
-        found.faults.append(f"the file is damaged ({problem})")
+        found.faults.append(f"the file is damaged ({_in_words(problem)})")
     return found
+
+
+def _in_words(problem: sqlite3.Error | KeyError) -> str:
+    if isinstance(problem, KeyError):
+        return "a message belongs to no topic"
+    return str(problem)
 
 
 def _definitions(database: sqlite3.Connection) -> dict[str, MessageDefinition]:

@@ -87,6 +87,22 @@ def _usual_interval(times: TimeArray) -> float:
     return float(np.median(steps[steps > 0])) * 1e-9
 
 
+def _without_wind(recording: Recording) -> UserError:
+    """What to do about a recording that no wind can be taken from."""
+    stated = recording.station.reference
+    if stated is not None:
+        what = f"{stated.topic.topic}: the reference has less than two messages"
+        remedy = "Check the topic of `reference` in the station file, and the recorder."
+    elif recording.truth is not None:
+        what = "the station file names no reference wind, though a simulator's true wind is here"
+        topic = recording.truth_topic
+        remedy = f"Add `reference: {{kind: truth, topic: {topic}}}` to the station file."
+    else:
+        what = "the station file names no reference wind to drive a simulation with"
+        remedy = "If one was recorded, add `reference: {kind: sonic, topic: TOPIC}` to it."
+    return UserError(f"{what}.", recording.name, remedy)
+
+
 def drive_from_recording(
     recording: Recording, wind: Winds | None = None, dt: float | None = None
 ) -> Drive:
@@ -104,11 +120,7 @@ def drive_from_recording(
     """
     source = wind if wind is not None else recording.reference
     if source is None or source.time.size < 2:
-        raise UserError(
-            "The recording has no reference wind to drive a simulation.",
-            recording.name,
-            "Give the station a `reference`, or drive the simulation with another wind.",
-        )
+        raise _without_wind(recording)
     usable = np.isfinite(source.velocity).all(axis=1)
     stamps, first = np.unique(source.time[usable], return_index=True)
     velocity = source.velocity[usable][first]

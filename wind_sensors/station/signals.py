@@ -218,6 +218,7 @@ class Recording:
         platform: Carrier, if any.
         temperature, pressure: Air, if any.
         truth: True wind at the sensor, if a simulator wrote it.
+        truth_topic: Where it was read from; empty where it was not.
         notes: What reading the recording had to say (bad lines, truncated bag, ...).
     """
 
@@ -232,4 +233,5 @@ class Recording:
     temperature: Series | None = None
     pressure: Series | None = None
     truth: Winds | None = None
+    truth_topic: str = ""
     notes: tuple[str, ...] = ()
