@@ -282,6 +282,60 @@ def test_a_simulation_stays_on_earth(
     )
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("simulate {s} --stability 0.5", "--stability: this has no effect without --surface-layer"),
+        ("simulate {s} --surface-layer --intensity 0.2", "--intensity: this has no effect beside"),
+        ("simulate {s} --course 3", "--course: this has no effect without --carrier."),
+        ("simulate {s} --exact-platform", "no effect on a station without a platform."),
+        ("simulate {s} --slow-period 5min", "without --slow-amplitude or --turn-amplitude or"),
+        ("simulate {s} --wind {r} --speed 12", "--speed: this has no effect beside --wind."),
+        ("simulate {s} --wind {r} --duration 1h", "lasts only 30 s. Leave it out"),
+        ("process {r} --bandwidth 3", "--bandwidth: this has no effect without --method inverse."),
+    ],
+)
+def test_an_option_without_effect_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: str, told: str
+) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording(seconds=30.0))
+    command = arguments.format(s="mast_cup_vane", r=folder).split()
+    assert main([*command, "-o", str(tmp_path / "out")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_measured_wind_blows_as_long_as_it_lasts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_recording(tmp_path / "steady", steady_recording(seconds=30.0))
+    command = ["simulate", "mast_cup_vane", "--wind", str(folder), "-o", str(tmp_path / "out")]
+    assert main(command) == 0
+    assert "simulated 30 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("process r -o o --window 10", ""),
+        ("process r -o o --window 10min", ""),
+        ("process r -o o --window 10furlongs", "argument --window: '10furlongs' is not a duration"),
+        ("demo --duration soon", "argument --duration: 'soon' is not a duration"),
+        ("simulate s -o o --jitter 50", "argument --jitter: '50' has no unit: write 50ms or 50s."),
+    ],
+)
+def test_durations_are_told_the_same_way_everywhere(
+    capsys: pytest.CaptureFixture[str], arguments: str, told: str
+) -> None:
+    if told:
+        with pytest.raises(SystemExit):
+            main(arguments.split())
+    else:
+        assert main(arguments.split()) == 2, "there is no such recording"
+    error = capsys.readouterr().err.strip()
+    assert told in error and "usage:" not in error and len(error.splitlines()) == 1
+
+
 def test_a_simulation_fits_the_memory(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

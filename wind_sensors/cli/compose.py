@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, Progress, TextColumn
 
+from wind_sensors.cli.durations import METAVAR, seconds
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
 from wind_sensors.cli.screen import screen
 
@@ -32,7 +33,10 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("-o", "--output", metavar="OUT", help="record everything to OUT")
     parser.add_argument("--force", action="store_true", help="replace OUT")
-    parser.add_argument("--duration", type=float, default=0.0, metavar="S", help="simulated time")
+    parser.add_argument(
+        "--duration", type=seconds, default=0.0, metavar=METAVAR,
+        help="simulated time, like 90s, 15min, 1h (default: until Ctrl-C)",
+    )  # fmt: skip
     parser.add_argument(
         "--rate",
         type=float,
@@ -42,9 +46,13 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("--seed", type=int, help="of everything random")
     parser.add_argument("--mean-speed", type=float, metavar="M/S", help="mean wind speed")
-    parser.add_argument("--intensity", type=float, help="turbulence intensity sigma/U")
+    parser.add_argument(
+        "--intensity", type=float, metavar="SHARE", help="turbulence intensity sigma/U"
+    )
     parser.add_argument("--method", help="kalman, inverse or naive")
-    parser.add_argument("--window", type=float, metavar="S", help="averaging time")
+    parser.add_argument(
+        "--window", type=seconds, metavar=METAVAR, help="averaging time (default: 10min)"
+    )
     add_ros_arguments(parser)
     parser.set_defaults(run=run)
 

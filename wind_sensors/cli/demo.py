@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from wind_sensors.cli.durations import METAVAR, seconds
 from wind_sensors.cli.screen import screen
 
 if TYPE_CHECKING:
@@ -61,8 +62,9 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace OUT if a demo wrote it")
     parser.add_argument(
-        "--duration", type=float, default=3600.0, metavar="S", help="simulated time"
-    )
+        "--duration", type=seconds, default=3600.0, metavar=METAVAR,
+        help="simulated time, like 90s, 15min, 1h (default: 1h)",
+    )  # fmt: skip
     parser.add_argument(
         "--rate", type=float, default=60.0, metavar="X",
         help="X times as fast as real time, or as fast as the machine can",

@@ -22,13 +22,14 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "(1966) and Jackson (c. 1980) from this package's formulas and simulations. Where a paper "
         "prints a wrong formula, its curve is shown dashed in red beside the right one.",
         epilog="Names: " + ", ".join(FIGURES),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help="figures to draw, like k94-13; all if none given"
     )
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder to write to")
-    parser.add_argument("--format", choices=("png", "svg", "pdf"), default="png")
+    parser.add_argument(
+        "--format", choices=("png", "svg", "pdf"), default="png", help="default: png"
+    )
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.set_defaults(run=run)
 

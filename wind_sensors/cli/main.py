@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from typing import NoReturn
 
 from wind_sensors.errors import UserError
 from wind_sensors.processes import one_thread_of_linear_algebra
@@ -33,6 +34,14 @@ COMMANDS: dict[str, str] = {
 
 _LIVE = frozenset({"record", "replay", "compose"})
 """Commands that a stop signal ends as it ends a node: with status 0, at any moment."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that tells what is wrong with the arguments first, and no page of usage."""
+
+    def error(self, message: str) -> NoReturn:
+        stop = "" if message.endswith((".", "!", "?")) else "."
+        self.exit(2, f"{self.prog}: {message}{stop} `{self.prog} --help` explains the options.\n")
 
 
 def module_of(command: str) -> str:
@@ -85,7 +94,7 @@ def _run(commands: Mapping[str, str], chosen: str | None, given: Sequence[str]) 
 
 def _parser(commands: Mapping[str, str], chosen: str | None) -> argparse.ArgumentParser:
     """The parser; only the chosen command's module is imported, so that help is instant."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="wind",
         description="Corrected wind from cups, propellers and vanes, on masts and on robots.",
         epilog="A RECORDING is a folder with recording.yaml and bag/, or a bag with --station "

@@ -26,12 +26,16 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "Numbers are in units of the turbulence intensity squared; 'same modes' is the formula "
         "evaluated with the turbulence that was actually drawn. Exit status 1 if a difference is "
         "larger than three standard errors plus the stated fourth-order remainder.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument("-o", "--output", metavar="OUT", help="Markdown file to write the table to")
     parser.add_argument("--force", action="store_true", help="replace OUT if it is there")
-    parser.add_argument("--pairs", type=int, default=200, help="realisations, each with its mirror")
-    parser.add_argument("--seed", type=int, default=1, help="of the turbulence, from 0")
+    parser.add_argument(
+        "--pairs", type=int, default=200, metavar="N",
+        help="realisations, each with its mirror (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of the turbulence, from 0 (default: %(default)s)"
+    )
     parser.set_defaults(run=run)
 
 

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from wind_sensors.cli.durations import METAVAR, seconds
 from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.estimation import (
@@ -84,19 +85,20 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="kalman: turbulence and instruments as one stochastic model; inverse: the equations "
         "solved for the wind; naive: the calibration alone, for comparison (default: %(default)s)",
     )
-    for name, unit, meaning in (
-        ("window", "s", "averaging time of means, biases and direction variance"),
-        ("output-rate", "Hz", "estimates per second"),
-        ("smoother-lag", "s", "how much later data still improves an estimate; large: full"),
-        ("bandwidth", "Hz", "half-power frequency of --method inverse"),
-        ("adaptation-time", "s", "memory of the turbulence estimate"),
+    for name, kind, unit, meaning in (
+        ("window", seconds, "s", "averaging time of means, biases and direction variance"),
+        ("output-rate", float, "Hz", "estimates per second"),
+        ("smoother-lag", seconds, "s", "how much later data still improves an estimate"),
+        ("bandwidth", float, "Hz", "half-power frequency, only with --method inverse"),
+        ("adaptation-time", seconds, "s", "memory of the turbulence estimate"),
     ):
+        default = getattr(defaults, name.replace("-", "_"))
         parser.add_argument(
             f"--{name}",
-            type=float,
-            default=getattr(defaults, name.replace("-", "_")),
-            metavar=unit,
-            help=f"{meaning} (default: %(default)g {unit})",
+            type=kind,
+            default=None if name == "bandwidth" else default,
+            metavar=METAVAR if kind is seconds else "HZ",
+            help=f"{meaning} (default: {default:g} {unit})",
         )
     parser.set_defaults(run=run)
 
@@ -137,13 +139,22 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _settings(args: argparse.Namespace) -> EstimatorSettings:
+    bandwidth = args.bandwidth
+    if bandwidth is None:
+        bandwidth = EstimatorSettings().bandwidth
+    elif args.method != "inverse":
+        raise UserError(
+            "this has no effect without --method inverse.",
+            "--bandwidth",
+            "Add it, or leave this out.",
+        )
     try:
         return EstimatorSettings(
             method=args.method,
             window=args.window,
             output_rate=args.output_rate,
             smoother_lag=args.smoother_lag,
-            bandwidth=args.bandwidth,
+            bandwidth=bandwidth,
             adaptation_time=args.adaptation_time,
         )
     except UserError as problem:

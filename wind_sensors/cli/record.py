@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from wind_sensors.cli.numbers import positive
+from wind_sensors.cli.durations import METAVAR, seconds
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
 
 if TYPE_CHECKING:
@@ -36,7 +36,9 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--topics", nargs="+", metavar="TOPIC", help="record these topics")
     which.add_argument("--all", action="store_true", help="record every topic but /clock")
-    parser.add_argument("--duration", type=positive, metavar="S", help="stop after S seconds")
+    parser.add_argument(
+        "--duration", type=seconds, metavar=METAVAR, help="stop after this, like 90s, 15min, 1h"
+    )
     parser.add_argument(
         "--use-sim-time", action="store_true", help="times of recording from /clock"
     )

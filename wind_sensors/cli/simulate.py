@@ -11,6 +11,8 @@ from pathlib import Path
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from wind_sensors.cli.durations import LONGEST, METAVAR, seconds, seconds_by_unit
+from wind_sensors.cli.option_rules import Rule, obey
 from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import velocity_from_direction, yaw_from_compass
@@ -28,32 +30,45 @@ from wind_sensors.turbulence.synthesis import TurbulenceSpec, isotropic_spec, su
 
 FASTEST_RATE = 1000.0
 """Samples per second beyond which no wind sensor goes."""
-LONGEST = 7.0 * 86_400.0
-"""Longest simulation [s]."""
 MOST_SAMPLES = 4_000_000
 """Of one simulation: a kilobyte each fills the memory of a usual machine."""
 
-_UNITS = {"ms": 1e-3, "min": 60.0, "h": 3600.0, "s": 1.0}
+_TOLERANCE = 1.0
+"""By so much a duration may exceed the measured wind that is blown again [s]."""
 
+_DEFAULTS: dict[str, float] = {
+    "duration": 900.0,
+    "speed": 8.0,
+    "direction_from": 270.0,
+    "intensity": 0.12,
+    "integral_length": 60.0,
+    "stability": 0.0,
+    "slow_amplitude": 0.0,
+    "turn_amplitude": 0.0,
+    "slow_period": 600.0,
+    "course": 90.0,
+}
+"""Of the options that have an effect only with or without others."""
 
-def seconds(text: str) -> float:
-    """A duration like `90`, `90s`, `50ms`, `15min`, `1h` in seconds."""
-    number, factor = text, 1.0
-    for unit, length in _UNITS.items():
-        if text.endswith(unit):
-            number, factor = text[: -len(unit)], length
-            break
-    try:
-        value = float(number) * factor
-    except ValueError as problem:
-        raise argparse.ArgumentTypeError(
-            f"'{text}' is not a duration: write it like 50ms, 90s, 15min or 1h"
-        ) from problem
-    if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"a duration must be positive, not '{text}'")
-    if value > LONGEST:
-        raise argparse.ArgumentTypeError(f"must be at most {LONGEST / 3600.0:g}h, not '{text}'")
-    return value
+RULES = (
+    Rule(
+        "--wind",
+        excludes=(
+            "--speed", "--direction-from", "--intensity", "--integral-length", "--surface-layer",
+            "--stability", "--slow-amplitude", "--turn-amplitude",
+        ),
+    ),
+    Rule("--surface-layer", excludes=("--intensity", "--integral-length")),
+    Rule("--stability", needs=("--surface-layer",)),
+    Rule(
+        "--slow-period",
+        needs=("--slow-amplitude", "--turn-amplitude", "--temperature-amplitude"),
+    ),
+    Rule("--follow", excludes=("--carrier", "--platform-speed", "--course")),
+    Rule("--platform-speed", needs=("--carrier",)),
+    Rule("--course", needs=("--carrier",)),
+)  # fmt: skip
+"""Which options go together."""
 
 
 def between(least: float, most: float, unit: str = "") -> Callable[[str], float]:
@@ -98,61 +113,73 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         f"true wind on {TRUTH_TOPIC}, which is the reference of a station that has no other. What "
         "is wrong with the station's instruments stands in the station file. The same seed gives "
         "the same signals to the bit.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument(
         "station", metavar="STATION", help="station file, or the name of a shipped configuration"
     )
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="folder to write")
     parser.add_argument("--force", action="store_true", help="replace OUT if it is there")
-    parser.add_argument("--duration", type=seconds, default="15min", help="like 90s, 15min, 1h")
-    parser.add_argument("--seed", type=int, default=0, help="of everything random, from 0")
+    parser.add_argument(
+        "--duration", type=seconds, metavar=METAVAR,
+        help="like 90s, 15min, 1h (default: 15min, or as long as the wind of --wind)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of everything random, from 0 (default: %(default)s)"
+    )
+
+    def number(
+        group: argparse._ArgumentGroup, option: str, kind: Callable[[str], float], unit: str,
+        what: str, default: float | None = None,
+    ) -> None:  # fmt: skip
+        """An option for a number; without a default of its own `_DEFAULTS` has one."""
+        shown = _DEFAULTS.get(option[2:].replace("-", "_"), default)
+        text = what if shown is None else f"{what} (default: {shown:g})"
+        group.add_argument(option, type=kind, default=default, metavar=unit, help=text)
 
     wind = parser.add_argument_group("wind")
-    wind.add_argument(
-        "--speed", type=between(0.01, 100.0, "m/s"), default=8.0, help="mean wind speed [m/s]"
+    number(wind, "--speed", between(0.01, 100.0, "m/s"), "M/S", "mean wind speed")
+    number(
+        wind, "--direction-from", between(-360.0, 360.0, "deg"), "DEG",
+        "direction the wind comes from, clockwise from north",
+    )  # fmt: skip
+    number(wind, "--intensity", share, "SHARE", "turbulence intensity sigma/U")
+    number(
+        wind, "--integral-length", between(0.1, 10_000.0, "m"), "M", "longitudinal integral length"
     )
-    wind.add_argument(
-        "--direction-from", type=between(-360.0, 360.0, "deg"), default=270.0, metavar="DEG",
-        help="direction the wind comes from, clockwise from north",
-    )  # fmt: skip
-    wind.add_argument("--intensity", type=share, default=0.12, help="turbulence intensity sigma/U")
-    wind.add_argument(
-        "--integral-length", type=between(0.1, 10_000.0, "m"), default=60.0, metavar="M",
-        help="longitudinal integral length [m]",
-    )  # fmt: skip
     wind.add_argument(
         "--surface-layer", action="store_true",
         help="anisotropic turbulence over the station's roughness at its height, instead of "
         "--intensity and --integral-length",
     )  # fmt: skip
-    wind.add_argument(
-        "--stability", type=between(-5.0, 2.0), default=0.0, metavar="Z/L",
-        help="height over the Monin-Obukhov length, with --surface-layer",
+    number(
+        wind, "--stability", between(-5.0, 2.0), "Z/L",
+        "height over the Monin-Obukhov length, with --surface-layer",
+    )  # fmt: skip
+    number(
+        wind, "--slow-amplitude", between(-50.0, 50.0, "m/s"), "M/S",
+        "amplitude of a slow change of the mean speed",
+    )  # fmt: skip
+    number(
+        wind, "--turn-amplitude", between(-180.0, 180.0, "deg"), "DEG",
+        "amplitude of a slow turn of the mean direction",
     )  # fmt: skip
     wind.add_argument(
-        "--slow-amplitude", type=between(-50.0, 50.0, "m/s"), default=0.0, metavar="M/S",
-        help="amplitude of a slow change of the mean speed",
+        "--slow-period", type=seconds, metavar=METAVAR,
+        help="period of the slow changes, that of the temperature too (default: 10min)",
     )  # fmt: skip
     wind.add_argument(
-        "--turn-amplitude", type=between(-180.0, 180.0, "deg"), default=0.0, metavar="DEG",
-        help="amplitude of a slow turn of the mean direction",
-    )  # fmt: skip
-    wind.add_argument(
-        "--slow-period", type=seconds, default="10min", help="period of both slow changes"
-    )
-    wind.add_argument(
-        "--wind", metavar="RECORDING", help="blow this recording's reference wind instead"
+        "--wind", metavar="RECORDING", help="blow this recording's reference or true wind instead"
     )
 
     carrier = parser.add_argument_group("carrier (a station with a platform)")
     carrier.add_argument("--carrier", choices=sorted(CARRIERS), help="how the platform moves")
-    carrier.add_argument(
-        "--platform-speed", type=between(0.0, 100.0, "m/s"), metavar="M/S", help="over ground"
-    )
-    carrier.add_argument(
-        "--course", type=between(-360.0, 360.0, "deg"), metavar="DEG", default=90.0,
-        help="clockwise from north",
+    number(
+        carrier, "--platform-speed", between(0.0, 100.0, "m/s"), "M/S",
+        "over ground, with --carrier (default: the carrier's usual one)",
+    )  # fmt: skip
+    number(
+        carrier, "--course", between(-360.0, 360.0, "deg"), "DEG",
+        "clockwise from north, with --carrier",
     )  # fmt: skip
     carrier.add_argument(
         "--follow", metavar="RECORDING", help="move as the platform in this recording"
@@ -162,28 +189,25 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
 
     air = parser.add_argument_group("air and rates")
-    air.add_argument(
-        "--temperature", type=between(-90.0, 60.0, "deg C"), default=15.0, help="[deg C]"
-    )
-    air.add_argument(
-        "--temperature-amplitude", type=between(-40.0, 40.0, "K"), default=0.0,
-        help="of a slow change [K]",
+    number(air, "--temperature", between(-90.0, 60.0, "deg C"), "DEG_C", "of the air", 15.0)
+    number(
+        air, "--temperature-amplitude", between(-40.0, 40.0, "K"), "K",
+        "of a slow change of the temperature (default: none)",
     )  # fmt: skip
-    air.add_argument(
-        "--pressure", type=between(10_000.0, 120_000.0, "Pa"), default=101_325.0, help="[Pa]"
-    )
-    air.add_argument(
-        "--rate", type=between(0.01, FASTEST_RATE, "per second"), default=20.0,
-        help="of all sampled signals [1/s]",
+    number(air, "--pressure", between(10_000.0, 120_000.0, "Pa"), "PA", "of the air", 101_325.0)
+    number(
+        air, "--rate", between(0.01, FASTEST_RATE, "per second"), "HZ",
+        "of all sampled signals", 20.0,
     )  # fmt: skip
 
     faults = parser.add_argument_group("faults of the transport")
-    faults.add_argument("--loss", type=share, default=0.0, help="share of messages lost")
-    faults.add_argument("--doubling", type=share, default=0.0, help="share that comes twice")
+    number(faults, "--loss", share, "SHARE", "of messages lost", 0.0)
+    number(faults, "--doubling", share, "SHARE", "of messages that come twice", 0.0)
     faults.add_argument(
-        "--jitter", type=seconds, default=None, help="largest random delay, like 50ms"
-    )
-    faults.add_argument("--nan", type=share, default=0.0, help="share of angles that are NaN")
+        "--jitter", type=seconds_by_unit, metavar=METAVAR,
+        help="largest random delay, with its unit, like 50ms (default: none)",
+    )  # fmt: skip
+    number(faults, "--nan", share, "SHARE", "of angles that are NaN", 0.0)
     faults.add_argument(
         "--clock-jump", type=between(-LONGEST, LONGEST, "s"), nargs=2, metavar=("AT", "BY"),
         help="the stamping clock jumps by BY seconds AT seconds after the start",
@@ -197,8 +221,14 @@ def run(args: argparse.Namespace) -> int:
     if args.seed < 0:
         raise UserError("The seed must not be negative.", "--seed", "Use 0 or more.")
     keep_inputs(args.output, (args.station, args.wind, args.follow))
+    obey(args, RULES)
     station = _without_truth(load_station(args.station))
-    scenario = _scenario(args, station)
+    if args.exact_platform and station.platform is None:
+        raise UserError(
+            "this has no effect on a station without a platform.", "--exact-platform",
+            "Leave it out, or add `platform` to the station file.",
+        )  # fmt: skip
+    scenario = _scenario(_completed(args), station)
     begin = time.perf_counter()
     with Progress(
         TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.0f} s of wind"),
@@ -215,6 +245,18 @@ def run(args: argparse.Namespace) -> int:
     print(_summary(recording, scenario.duration, spent))
     print(f"wrote {folder}")
     return 0
+
+
+def _completed(args: argparse.Namespace) -> argparse.Namespace:
+    """The options with their defaults; the duration of a measured wind stays open."""
+    values = vars(args)
+    open_ended = {"duration"} if args.wind else set()
+    missing = {
+        name: value
+        for name, value in _DEFAULTS.items()
+        if values[name] is None and name not in open_ended
+    }
+    return argparse.Namespace(**{**values, **missing})
 
 
 def _without_truth(station: Station) -> Station:
@@ -254,7 +296,7 @@ def _scenario(args: argparse.Namespace, station: Station) -> Scenario:
         reference_rate=args.rate,
         platform_rate=args.rate,
         temperature=args.temperature,
-        temperature_amplitude=args.temperature_amplitude,
+        temperature_amplitude=args.temperature_amplitude or 0.0,
         temperature_period=args.slow_period,
         pressure=args.pressure,
         platform_noise=not args.exact_platform,
@@ -271,14 +313,20 @@ def _scenario(args: argparse.Namespace, station: Station) -> Scenario:
 
 
 def _wind(args: argparse.Namespace, station: Station) -> tuple[TurbulenceSpec | Winds, float]:
-    duration = float(args.duration)
     if args.wind:
         measured = read_recording(args.wind)
         wind = measured.truth if measured.reference is None else measured.reference
         if wind is None or wind.time.size < 2:
             raise UserError("The recording has no reference wind.", args.wind, "Name one that has.")
-        stamps = wind.time
-        return wind, min(duration, float(stamps.max() - stamps.min()) * 1e-9)
+        length = float(wind.time.max() - wind.time.min()) * 1e-9
+        duration = length if args.duration is None else float(args.duration)
+        if duration > length + _TOLERANCE:
+            raise UserError(
+                f"the wind of {args.wind} lasts only {length:.0f} s.",
+                "--duration",
+                "Leave it out to use all of that wind.",
+            )
+        return wind, min(duration, length)
     towards = velocity_from_direction(1.0, args.direction_from)
     direction = math.atan2(float(towards[1]), float(towards[0]))
     if args.surface_layer:
@@ -297,7 +345,7 @@ def _wind(args: argparse.Namespace, station: Station) -> tuple[TurbulenceSpec | 
         slow_period=args.slow_period,
         turn_amplitude=math.radians(args.turn_amplitude),
     )
-    return slow, duration
+    return slow, float(args.duration)
 
 
 def _trajectory(args: argparse.Namespace) -> Trajectory | PlatformStates | None:
@@ -309,10 +357,6 @@ def _trajectory(args: argparse.Namespace) -> Trajectory | PlatformStates | None:
             )
         return followed.platform
     if args.carrier is None:
-        if args.platform_speed is not None:
-            raise UserError(
-                "--platform-speed needs to know what moves.", "--carrier", "Name a carrier."
-            )
         return None
     course = float(yaw_from_compass(args.course))
     make = CARRIERS[args.carrier]
