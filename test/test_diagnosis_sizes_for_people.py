@@ -14,9 +14,12 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.recordings.station_files import shipped_profiles
+from wind_sensors.report.corrected_station import corrected_station
 from wind_sensors.report.names import names_of
 from wind_sensors.report.sizes import sizes_of
-from wind_sensors.station.model import Platform, Station
+from wind_sensors.station.model import Change, Platform, Station
+from wind_sensors.station.reading import read_station
 
 
 def finding(effect: str, **parameters: Estimate) -> Finding:
@@ -63,6 +66,26 @@ def test_a_turned_sensor_does_not_turn_the_bow() -> None:
     ahead = Estimate(-90.0, -95.0, -85.0, "deg")
     (size,) = sizes_of(finding("wake_shadow", bearing_from=ahead), boat)
     assert size.value == "0"
+
+
+def test_the_corrected_station_tells_what_was_found_and_rounds() -> None:
+    friction = Estimate(2.1466406783361855, 1.88, 2.41, "m/s")
+    found = finding("bearing_friction", friction_speed=friction)
+    change = Change(start=1_234_567.8, instrument="cup", set={"friction_speed": friction.value})
+    cup = STATION.instrument("cup").model_copy(update={"friction_speed": friction.value})
+    others = tuple(i for i in STATION.instruments if i.name != "cup")
+    station = STATION.model_copy(update={"instruments": (cup, *others), "changes": (change,)})
+    text = corrected_station("day\none", "named", [found], station)
+    first, second, third = (line for line in text.splitlines() if line.startswith("#"))
+    assert "`wind diagnose`" in first and "named" in first
+    assert "95 %" in second
+    told = "bearing friction (cup), all the time: friction speed 2.15 m/s (1.88 to 2.41)"
+    assert third == f"# - {told}"
+    again = read_station(text, "station_corrected.yaml", shipped_profiles())
+    assert again.instrument("cup") == cup.model_copy(update={"friction_speed": 2.14664})
+    assert again.changes == (
+        change.model_copy(update={"set": {"friction_speed": 2.14664}}),
+    ), "a late moment keeps its tenth of a second"
 
 
 def test_long_times_are_days_and_short_ones_seconds() -> None:

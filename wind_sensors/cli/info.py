@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -14,18 +15,23 @@ from wind_sensors.cli.screen import screen
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData
 from wind_sensors.recordings.mapping import mapping_markdown
-from wind_sensors.recordings.reading import name_of, open_recording, signals_of
+from wind_sensors.recordings.reading import YAML_SUFFIXES, name_of, open_recording, signals_of
 from wind_sensors.recordings.station_files import (
     configuration_folder,
     load_station,
     shipped_profiles,
 )
-from wind_sensors.station.model import Angle, Bivane, Cup, Propeller, Station, Vane
+from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Station, Vane
 from wind_sensors.station.reference import schema_markdown
 from wind_sensors.station.signals import Recording, TimeArray
 
 _PLAIN_WIDTH = 120
 """Of the tables where no terminal says its own."""
+_IN_WORDS = {
+    "name", "kind", "profile", "distance_constant", "damping_ratio", "calibration_distance",
+    "pulses_per_revolution", "mounted_on",
+}  # fmt: skip
+"""Keys of an instrument that have their own place or words."""
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -68,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
             options.path,
             f"Configurations that ship: {', '.join(sorted(shipped))}.",
         )
-    if path.suffix in {".yaml", ".yml"} or not path.exists():
+    if path.suffix in YAML_SUFFIXES or not path.exists():
         _print_station(console, load_station(path))
         return 0
     content, station = open_recording(path, options.station)
@@ -157,14 +163,39 @@ def _print_station(console: Console, station: Station) -> None:
 
 
 def _constants(instrument: Cup | Propeller | Vane | Bivane) -> str:
+    """All that differs from a perfect instrument, the usual constants in words."""
     if isinstance(instrument, Angle):
         text = f"distance constant {instrument.distance_constant:g} m, "
-        return text + f"damping ratio {instrument.damping_ratio:g}"
+        return text + f"damping ratio {instrument.damping_ratio:g}" + _others(instrument)
     text = f"{instrument.calibration_distance:g} m/rad, {instrument.pulses_per_revolution} pulses"
     text += f" a turn, distance constant {instrument.distance_constant:g} m"
     if isinstance(instrument, Propeller) and instrument.mounted_on:
         text += f", on '{instrument.mounted_on}'"
-    return text
+    return text + _others(instrument)
+
+
+def _others(entry: BaseModel) -> str:
+    """Further keys that are not at their defaults, topics left out, as a sentence's end."""
+    found = [f"{key} {value}" for key, value in _stated(entry).items() if key not in _IN_WORDS]
+    return "".join(f", {text}" for text in found)
+
+
+def _stated(entry: BaseModel) -> dict[str, str]:
+    stated = {}
+    for key, field in type(entry).model_fields.items():
+        value = getattr(entry, key)
+        if isinstance(value, Input) or (not field.is_required() and value == field.get_default()):
+            continue
+        stated[key] = _text(value)
+    return stated
+
+
+def _text(value: object) -> str:
+    if isinstance(value, BaseModel):
+        return f"({', '.join(f'{key} {text}' for key, text in _stated(value).items())})"
+    if isinstance(value, tuple):
+        return f"({', '.join(_text(item) for item in value)})"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _print_profiles(console: Console) -> None:

@@ -17,10 +17,9 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
-from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.recordings.writing import keep_inputs, write_topics
+from wind_sensors.report.corrected_station import corrected_station
 from wind_sensors.report.diagnosis_page import page
-from wind_sensors.station.writing import station_to_yaml
 
 NUMBER = "std_msgs/msg/Float64"
 
@@ -103,7 +102,9 @@ def write(folder: Path, diagnosis: Diagnosis, without: Sequence[str] = ()) -> li
     """
     with refused_in_words(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        station_text = station_to_yaml(diagnosis.station, shipped_profiles())
+        station_text = corrected_station(
+            diagnosis.recording, diagnosis.verdict, diagnosis.findings, diagnosis.station
+        )
         (folder / "diagnosis.json").write_text(
             json.dumps({**as_json(diagnosis), "catalogue_without": list(without)}, indent=1) + "\n",
             encoding="utf-8",

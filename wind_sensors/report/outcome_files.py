@@ -11,11 +11,10 @@ from wind_sensors.diagnosis.outcome import Outcome, outcome_json
 from wind_sensors.recordings.bag import typestore
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.serialising import TopicMessages, serialised, template
-from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.recordings.writing import write_topics
+from wind_sensors.report.corrected_station import corrected_station
 from wind_sensors.report.diagnosis_files import NAMES, NUMBER
 from wind_sensors.report.outcome_page import outcome_page
-from wind_sensors.station.writing import station_to_yaml
 
 
 def _residual_topics(outcome: Outcome) -> list[TopicMessages]:
@@ -43,7 +42,9 @@ def write_outcome(folder: Path, outcome: Outcome) -> list[Path]:
     Raises:
         UserError: Nothing can be written there.
     """
-    station_text = station_to_yaml(outcome.station, shipped_profiles())
+    station_text = corrected_station(
+        outcome.recording, outcome.verdict, outcome.findings, outcome.station
+    )
     text, page = json.dumps(outcome_json(outcome), indent=1) + "\n", outcome_page(outcome)
     topics = _residual_topics(outcome)
     with refused_in_words(folder):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from io import StringIO
 from typing import Any
@@ -13,8 +14,16 @@ from ruamel.yaml.comments import CommentedSeq
 from wind_sensors.station.model import Input, Instrument, Station
 from wind_sensors.station.profiles import Profile
 
+_COARSEST = 0.1
+"""No rounding is coarser, so that moments late in a recording stay apart."""
 
-def station_to_yaml(station: Station, profiles: Mapping[str, Profile] | None = None) -> str:
+
+def station_to_yaml(
+    station: Station,
+    profiles: Mapping[str, Profile] | None = None,
+    *,
+    digits: int | None = None,
+) -> str:
     """The station file that reads back as this station.
 
     Only keys that differ from their default are written, and the constants of a profile that an
@@ -24,12 +33,27 @@ def station_to_yaml(station: Station, profiles: Mapping[str, Profile] | None = N
         station: The station.
         profiles: Profiles that the instruments name; without them every key that an instrument
             was given is written.
+        digits: Significant ones of the numbers, for constants that were fitted; None: all.
     """
     stream = StringIO()
     writer = YAML()
     writer.width = 100
-    writer.dump(_entry(station, profiles), stream)
+    document = _entry(station, profiles)
+    writer.dump(document if digits is None else _rounded(document, digits), stream)
     return stream.getvalue()
+
+
+def _rounded(value: Any, digits: int) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item, digits) for key, item in value.items()}
+    if isinstance(value, CommentedSeq):
+        for place, item in enumerate(value):
+            value[place] = _rounded(item, digits)
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        short = float(f"{value:.{digits}g}")
+        return short if abs(short - value) <= 0.5 * _COARSEST else round(value, 1)
+    return value
 
 
 def _entry(entry: BaseModel, profiles: Mapping[str, Profile] | None) -> Any:
