@@ -350,6 +350,15 @@ def test_a_simulation_fits_the_memory(
     [
         (("monte-carlo", "--pairs", "0"), "--pairs: 0 is too few. Give at least 2;"),
         (("monte-carlo", "--seed", "-1"), "--seed: The seed must not be negative. Use"),
+        (("process", "{s}", "-o", "{tmp}/new"), "this is a YAML file and no recording. Give a"),
+        (("process", "{r}", "--station", "{r}", "-o", "{tmp}/new"), "this is a folder. Name the"),
+        (
+            ("process", "{r}", "--station", "{tmp}/misspelt", "-o", "{tmp}/new"),
+            "no such topic is in the bag: did you mean /cup/pulses?",
+        ),
+        (("info", "{tmp}/twins.yaml"), "twins.yaml:3: instruments[1].name: two instruments are"),
+        (("info", "{tmp}/none.yaml"), "none.yaml:1: instruments: the list is empty. Add at least"),
+        (("info", "{tmp}/latin.yaml"), "the station file is not a text in UTF-8. Save it as"),
         (("figures", "k94-99", "-o", "{tmp}"), "there is no figure 'k94-99'. Known: "),
         (("figures", "k94-2", "-o", "{tmp}/file"), "file: this is a file, not a folder. Choose"),
         (("figures", "k94-2", "-o", "{tmp}/file/x"), "x: the result cannot be written (Not a dir"),
@@ -366,8 +375,30 @@ def test_refusals_are_whole_sentences_about_what_was_typed(
 ) -> None:
     folder = write_recording(tmp_path / "steady", steady_recording(seconds=5.0))
     (tmp_path / "file").write_text("no folder")
-    assert main([text.format(r=folder, tmp=tmp_path) for text in arguments]) == 2
+    own = (folder / "recording.yaml").read_text(encoding="utf-8")
+    (tmp_path / "misspelt").write_text(own.replace("/cup/pulses", "/cup/puls"))
+    vane = "- {name: v, kind: vane, joint_states: /v, distance_constant: 1.0, damping_ratio: 0.3}\n"
+    (tmp_path / "twins.yaml").write_text(f"instruments:\n{vane}{vane}")
+    (tmp_path / "none.yaml").write_text("instruments: []\n")
+    (tmp_path / "latin.yaml").write_bytes(b"# K\xe4lte\n")
+    names = {"r": folder, "tmp": tmp_path, "s": folder / "recording.yaml"}
+    assert main([text.format(**names) for text in arguments]) == 2
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("setting", ["PYTHONIOENCODING=ascii", "LC_ALL=C"])
+def test_a_name_that_the_locale_lacks_is_no_traceback(tmp_path: Path, setting: str) -> None:
+    folder = write_recording(tmp_path / "März", steady_recording(seconds=20.0))
+    key, value = setting.split("=")
+    environment = {**os.environ, "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", key: value}
+    out = tmp_path / "Wind"
+    command = [sys.executable, "-m", "wind_sensors.cli", "process", str(folder), "-o", str(out)]
+    done = subprocess.run(
+        [*command, "--method", "naive"], env=environment, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"rz, naive" in done.stdout and b"+-" in done.stdout
+    assert read_recording(folder).name == "März"
 
 
 def test_a_table_that_cannot_be_written_is_no_traceback(
@@ -427,6 +458,12 @@ def test_info_shows_topics_rates_station_and_notes(
     (folder / "bag" / "metadata.yaml").unlink()
     assert main(["info", str(folder)]) == 0
     assert "metadata.yaml" in capsys.readouterr().out
+    text = (folder / "recording.yaml").read_text(encoding="utf-8")
+    corrected = tmp_path / "station_corrected.yaml"
+    corrected.write_text(text.replace("distance_constant: 1.7", "distance_constant: 1.7\n"
+                                      "  friction_speed: 2.15"), encoding="utf-8")  # fmt: skip
+    assert main(["info", str(corrected)]) == 0
+    assert "friction_speed 2.15, starting_speed 0.25" in capsys.readouterr().out
     assert main(["info", "mast_cup_vane"]) == 0
     assert "risoe_cup" in capsys.readouterr().out
     assert main(["info", "--profiles"]) == 0

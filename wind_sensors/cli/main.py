@@ -10,6 +10,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import NoReturn
 
+from wind_sensors.cli.encoding import show_any_text
 from wind_sensors.errors import UserError
 from wind_sensors.processes import one_thread_of_linear_algebra
 
@@ -59,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 on success, 1 on a judgement that the user asked for, 2 on bad input.
     """
+    show_any_text()
     one_thread_of_linear_algebra()
     given = list(sys.argv[1:] if arguments is None else arguments)
     commands = {name: text for name, text in COMMANDS.items() if find_spec(module_of(name))}

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -18,6 +17,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.motion.frames import velocity_from_direction, yaw_from_compass
 from wind_sensors.recordings import load_station, read_recording, write_recording
 from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
+from wind_sensors.recordings.reading import name_of
 from wind_sensors.recordings.writing import keep_inputs
 from wind_sensors.simulation.run import simulate
 from wind_sensors.simulation.scenario import Scenario, TransportFaults
@@ -236,7 +236,7 @@ def run(args: argparse.Namespace) -> int:
     ) as progress:  # fmt: skip
         task = progress.add_task("simulate", total=scenario.duration)
         recording = simulate(
-            station, scenario, Path(args.output).name,
+            station, scenario, name_of(args.output),
             progress=lambda done: progress.update(task, completed=done),
         )  # fmt: skip
     spent = time.perf_counter() - begin

@@ -131,10 +131,16 @@ def _must_tell_a_vector(recording: Recording) -> None:
     ):
         if names and not heard.intersection(names):
             named = ", ".join(f"'{name}' ({topics[name]})" for name in names)
+            said = [
+                note for note in recording.notes for name in names if note.startswith(topics[name])
+            ]
             raise UserError(
                 f"nothing usable was heard of {named}, so the wind's {what} is not known.",
                 recording.name,
-                "Check the instrument, the recorder and the topic in the station file.",
+                " ".join(
+                    ["Check the instrument, the recorder and the topic in the station file."]
+                    + [f"Reading said: {note}" for note in dict.fromkeys(said)]
+                ),
             )
 
 

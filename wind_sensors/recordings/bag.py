@@ -159,7 +159,8 @@ def _salvaged(path: Path, wanted: Callable[[str], bool], problem: Exception) -> 
     files = [path] if path.is_file() else sorted(p for s in _SUFFIXES for p in path.glob(f"*{s}"))
     content = BagContent({}, get_typestore(Stores.ROS2_JAZZY), salvaged=True)
     if not files:
-        content.notes.append(f"{problem}".rstrip("."))
+        reason = problem.strerror if isinstance(problem, OSError) else None
+        content.notes.append(f"{reason or problem}".rstrip("."))
     for file in files:
         found = salvage(file)
         for message in sorted(found.messages, key=lambda message: message.time):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +47,7 @@ from wind_sensors.station.signals import (
 
 STATION_FILE = "recording.yaml"
 BAG_FOLDER = "bag"
+YAML_SUFFIXES = (".yaml", ".yml")
 WIND_TOPIC = "/wind"
 WIND_TYPE = "geometry_msgs/msg/TwistWithCovarianceStamped"
 Mask = npt.NDArray[np.bool_]
@@ -80,6 +83,12 @@ def open_recording(
     folder = Path(path)
     if not folder.exists():
         raise UserError("there is no such recording.", str(path), "Check the path.")
+    if folder.is_file() and folder.suffix in YAML_SUFFIXES:
+        raise UserError(
+            "this is a YAML file and no recording.",
+            str(path),
+            f"Give a folder with {STATION_FILE} and {BAG_FOLDER}/, or a bag with --station FILE.",
+        )
     bag = bag_of(folder)
     if bag.is_dir() and not any(bag.iterdir()):
         raise UserError(
@@ -110,8 +119,9 @@ def home_of(path: Path) -> Path:
 
 
 def name_of(path: str | Path) -> str:
-    """The name of a recording."""
-    return home_of(Path(path)).name or Path(path).resolve().name
+    """The name of a recording, as text that can be written whatever the locale's encoding."""
+    name = home_of(Path(path)).name or Path(path).resolve().name
+    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def bag_of(folder: Path) -> Path:
@@ -337,7 +347,8 @@ class _SignalReader:
     def _topic(self, source: Input, purpose: str) -> TopicData | None:
         data = self.content.topics.get(absolute(source.topic))
         if data is None or not data.raw:
-            self.notes.append(f"{source.topic}: no messages ({purpose})")
+            hint = "" if data is not None else self._instead_of(absolute(source.topic))
+            self.notes.append(f"{source.topic}: no messages ({purpose}){hint}")
             return None
         if data.message_type != source.type:
             raise UserError(
@@ -347,6 +358,14 @@ class _SignalReader:
                 f"Write `{{topic: {source.topic}, type: {data.message_type}, field: ...}}`.",
             )
         return data
+
+    def _instead_of(self, topic: str) -> str:
+        """What the bag has where a topic is misspelt, as the end of a sentence."""
+        known = sorted(self.content.topics)
+        close = get_close_matches(topic, known, n=1, cutoff=0.8)
+        if close:
+            return f"; no such topic is in the bag: did you mean {close[0]}?"
+        return f"; topics in the bag: {', '.join(known)}" if known else ""
 
     def _numbers(
         self, source: Input, data: TopicData, path: FieldPath

@@ -64,6 +64,16 @@ def load_station(path: str | Path) -> Station:
         raise UserError(
             "there is no such station file.", str(path), f"Configurations that ship: {names}."
         ) from None
-    except (OSError, UnicodeDecodeError) as problem:
-        raise UserError(f"the station file cannot be read ({problem}).", str(path)) from None
+    except IsADirectoryError:
+        raise UserError(
+            "this is a folder.", str(path), "Name the station file, like recording.yaml in it."
+        ) from None
+    except UnicodeDecodeError:
+        raise UserError(
+            "the station file is not a text in UTF-8.", str(path), "Save it as UTF-8."
+        ) from None
+    except OSError as problem:
+        raise UserError(
+            f"the station file cannot be read ({problem.strerror or problem}).", str(path)
+        ) from None
     return read_station(text, str(path), shipped_profiles())

@@ -173,6 +173,8 @@ def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:
         return f"'{given}' stands where a group of keys belongs.", about
     if kind in {"tuple_type", "list_type"}:
         return f"'{given}' stands where a list belongs.", about
+    if kind == "too_short":
+        return "the list is empty.", f"Add at least one entry. {about}".rstrip()
     if kind == "told":
         return f"{context['what']}.", str(context["remedy"])
     if kind == "value_error":

@@ -47,6 +47,8 @@ def station_of(document: Document, profiles: Mapping[str, Profile]) -> Station:
     given, problems = _with_profiles(document, profiles)
     given = _with_inputs(given, (), given)
     problems += implausible(document, given)
+    same = _same_names(document, given)
+    problems += same
     station: Station | None = None
     try:
         station = Station.model_validate(given)
@@ -54,7 +56,7 @@ def station_of(document: Document, profiles: Mapping[str, Profile]) -> Station:
         found = [
             _named(problem_of(detail, document, given), detail["loc"], given, profiles)
             for detail in error.errors(include_url=False)
-            if not _follows(detail, given)
+            if not _follows(detail, given) and not (same and detail["loc"] == ())
         ]
         problems += found
     if station is not None:
@@ -62,6 +64,22 @@ def station_of(document: Document, profiles: Mapping[str, Profile]) -> Station:
     if problems or station is None:
         raise _error(document, problems)
     return station
+
+
+def _same_names(document: Document, given: dict[str, Any]) -> list[Problem]:
+    """Instruments that have the name of an earlier one."""
+    seen: set[str] = set()
+    found = []
+    instruments = given.get("instruments")
+    for index, entry in enumerate(instruments if isinstance(instruments, list) else ()):
+        name = entry.get("name") if isinstance(entry, dict) else None
+        if isinstance(name, str) and name in seen:
+            path: Path = ("instruments", index, "name")
+            what = f"two instruments are called '{name}'."
+            found.append(Problem(document.where(path), path, what, "Give each its own name."))
+        elif isinstance(name, str):
+            seen.add(name)
+    return found
 
 
 def _follows(detail: ErrorDetails, given: dict[str, Any]) -> bool:
