@@ -56,7 +56,7 @@ def steady_recording(speed: float = 8.0, seconds: float = 120.0) -> Recording:
         {"cup": Pulses(time)},
         {"vane": Angles(grid, np.pi + 0.1 * wave)},
         Winds(grid, wind),
-    )  # fmt: skip
+    )
 
 
 def test_help_lists_what_is_installed_and_starts_at_once(
@@ -147,7 +147,7 @@ def test_force_never_removes_what_is_read(
     names = {
         "r": folder, "other": other, "tmp": tmp_path, "link": tmp_path / "link",
         "station": tmp_path / "station.yaml",
-    }  # fmt: skip
+    }
     before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
     assert main([*(text.format(**names) for text in arguments), "--force"]) == 2
     assert "Name another folder with -o." in capsys.readouterr().err
@@ -461,7 +461,7 @@ def test_info_shows_topics_rates_station_and_notes(
     text = (folder / "recording.yaml").read_text(encoding="utf-8")
     corrected = tmp_path / "station_corrected.yaml"
     corrected.write_text(text.replace("distance_constant: 1.7", "distance_constant: 1.7\n"
-                                      "  friction_speed: 2.15"), encoding="utf-8")  # fmt: skip
+                                      "  friction_speed: 2.15"), encoding="utf-8")
     assert main(["info", str(corrected)]) == 0
     assert "friction_speed 2.15, starting_speed 0.25" in capsys.readouterr().out
     assert main(["info", "mast_cup_vane"]) == 0

@@ -232,7 +232,7 @@ def test_lost_edges_are_restored(recording: Recording, share: float) -> None:
     error = np.hypot(*(found.velocity - whole.velocity)[100:, :2].T)
     assert np.sqrt(np.mean(error**2)) < 0.25
     assert abs(np.hypot(*found.velocity[100:, :2].T).mean()
-               / np.hypot(*whole.velocity[100:, :2].T).mean() - 1.0) < 0.003  # fmt: skip
+               / np.hypot(*whole.velocity[100:, :2].T).mean() - 1.0) < 0.003
     edges = item(estimator, "cup edges")
     assert edges.level == HealthLevel.WARN
     assert int(edges.values["lost edges"]) > 0.08 * len(recording.pulses["cup"].time)
@@ -313,7 +313,7 @@ def test_means_are_refused_stated_or_not(recording: Recording) -> None:
     rows = replace(
         recording, pulses={"cup": Pulses(time, np.arange(30.0))},
         angles={"vane": Angles(time, np.zeros(30))},
-    )  # fmt: skip
+    )
     with pytest.raises(UserError, match=r"29 of 30 stamps .*usually 600 s.*averaging_time"):
         process(rows)
 

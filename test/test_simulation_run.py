@@ -59,7 +59,7 @@ def station(moving: bool = False, **keys: Any) -> Station:
             calibration_distance=0.2, distance_constant=1.7,
             electronics=Electronics(loss_probability=0.05, bounce_probability=0.02),
         ),
-    )  # fmt: skip
+    )
     if moving:
         keys.setdefault(
             "platform",
@@ -175,7 +175,7 @@ def test_attitude_rates_velocity_and_position_of_a_carrier_fit_together(carrier:
         station(moving=True),
         scenario(trajectory=trajectory, platform_noise=False, sample_rate=100.0,
                  platform_rate=100.0, duration=130.0),
-    ).platform  # fmt: skip
+    ).platform
     assert found is not None
     q = Rotation.from_quat(found.attitude)
     turned = (q[:-2].inv() * q[2:]).as_rotvec() / 0.02
@@ -192,7 +192,7 @@ ERRORS = Platform(
     odometry=Input(topic="/odom"), sensor_position=(0.3, 0.0, 2.0), frame="ned",
     velocity_axes="earth", velocity_scale=1.1, heading_reference="magnetic",
     magnetic_declination_deg=12.0, heading_deviation=HeadingDeviation(sine_deg=6.0),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("platform", [None, ERRORS])
@@ -326,7 +326,7 @@ def test_a_bivane_signals_both_angles() -> None:
     b = Bivane(
         name="bivane", azimuth=Input(topic="/az"), elevation=Input(topic="/el"),
         distance_constant=2.4, damping_ratio=0.3,
-    )  # fmt: skip
+    )
     found = simulate(station(instruments=(b,)), scenario(duration=120.0))
     elevation = found.angles["bivane/elevation"].angle
     assert found.truth is not None

@@ -37,7 +37,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--healthy", metavar="RECORDING", nargs="+", action="extend", default=[],
         help="recordings of the same station while nothing was wrong",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--baseline", metavar="FILE", type=Path, help="what `wind baseline` wrote, instead"
     )
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
         searcher = searcher_of(
             comparison, baseline, catalogue(), {},
             progress=lambda share: progress.update(task, completed=0.8 * share),
-        )  # fmt: skip
+        )
         simulated = searcher.bank.without
         whitener = searcher.whitener(simulated)
         bank = region_bank(whitener, simulated)

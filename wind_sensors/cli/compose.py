@@ -36,7 +36,7 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--duration", type=seconds, default=0.0, metavar=METAVAR,
         help="simulated time, like 90s, 15min, 1h (default: until Ctrl-C)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--rate",
         type=float,

@@ -64,11 +64,11 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--duration", type=seconds, default=3600.0, metavar=METAVAR,
         help="simulated time, like 90s, 15min, 1h (default: 1h)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--rate", type=float, default=60.0, metavar="X",
         help="X times as fast as real time, or as fast as the machine can",
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", type=int, default=7, help="of everything random")
     parser.set_defaults(run=run)
 
@@ -196,7 +196,7 @@ def _live_hour(
     return Circumstances(
         _WORDS, args.duration, live.wall_seconds, sum(live.counts.values()),
         ("sim_node", "cup_vane_node"), _corner_frequency(folder / STATION_FILE),
-    )  # fmt: skip
+    )
 
 
 def _offline_hour(args: argparse.Namespace, folder: Path, progress: Progress) -> Circumstances:

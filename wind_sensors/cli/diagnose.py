@@ -40,14 +40,14 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--healthy", metavar="RECORDING", nargs="+", action="extend", default=[],
         help="recordings of the same station while nothing was wrong",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--baseline", metavar="FILE", type=Path, help="what `wind baseline` wrote, instead"
     )
     parser.add_argument(
         "--without", metavar="EFFECT", nargs="+", action="extend", default=[],
         help="effects to take out of the catalogue",
-    )  # fmt: skip
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder")
     parser.add_argument("--force", action="store_true", help="replace an earlier diagnosis")
     parser.set_defaults(run=run)

@@ -30,7 +30,7 @@ _PLAIN_WIDTH = 120
 _IN_WORDS = {
     "name", "kind", "profile", "distance_constant", "damping_ratio", "calibration_distance",
     "pulses_per_revolution", "mounted_on",
-}  # fmt: skip
+}
 """Keys of an instrument that have their own place or words."""
 
 

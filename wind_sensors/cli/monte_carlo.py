@@ -32,7 +32,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--pairs", type=int, default=200, metavar="N",
         help="realisations, each with its mirror (default: %(default)s)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--seed", type=int, default=1, help="of the turbulence, from 0 (default: %(default)s)"
     )

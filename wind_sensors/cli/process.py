@@ -194,7 +194,7 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
     table.add_column("window\n[s]")
     turbulence = f"turbulence {', '.join(components)}\n[m/s]"
     for heading in ("mean speed\n[m/s]", "vector mean\n[m/s]", "from\n[deg]", turbulence,
-                    "direction spread\n[deg]"):  # fmt: skip
+                    "direction spread\n[deg]"):
         table.add_column(heading, justify="right")
     if with_vertical:
         table.add_column("upwards\n[m/s]", justify="right")

@@ -67,7 +67,7 @@ RULES = (
     Rule("--follow", excludes=("--carrier", "--platform-speed", "--course")),
     Rule("--platform-speed", needs=("--carrier",)),
     Rule("--course", needs=("--carrier",)),
-)  # fmt: skip
+)
 """Which options go together."""
 
 
@@ -122,7 +122,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--duration", type=seconds, metavar=METAVAR,
         help="like 90s, 15min, 1h (default: 15min, or as long as the wind of --wind)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--seed", type=int, default=0, help="of everything random, from 0 (default: %(default)s)"
     )
@@ -130,7 +130,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     def number(
         group: argparse._ArgumentGroup, option: str, kind: Callable[[str], float], unit: str,
         what: str, default: float | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """An option for a number; without a default of its own `_DEFAULTS` has one."""
         shown = _DEFAULTS.get(option[2:].replace("-", "_"), default)
         text = what if shown is None else f"{what} (default: {shown:g})"
@@ -141,7 +141,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     number(
         wind, "--direction-from", between(-360.0, 360.0, "deg"), "DEG",
         "direction the wind comes from, clockwise from north",
-    )  # fmt: skip
+    )
     number(wind, "--intensity", share, "SHARE", "turbulence intensity sigma/U")
     number(
         wind, "--integral-length", between(0.1, 10_000.0, "m"), "M", "longitudinal integral length"
@@ -150,23 +150,23 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--surface-layer", action="store_true",
         help="anisotropic turbulence over the station's roughness at its height, instead of "
         "--intensity and --integral-length",
-    )  # fmt: skip
+    )
     number(
         wind, "--stability", between(-5.0, 2.0), "Z/L",
         "height over the Monin-Obukhov length, with --surface-layer",
-    )  # fmt: skip
+    )
     number(
         wind, "--slow-amplitude", between(-50.0, 50.0, "m/s"), "M/S",
         "amplitude of a slow change of the mean speed",
-    )  # fmt: skip
+    )
     number(
         wind, "--turn-amplitude", between(-180.0, 180.0, "deg"), "DEG",
         "amplitude of a slow turn of the mean direction",
-    )  # fmt: skip
+    )
     wind.add_argument(
         "--slow-period", type=seconds, metavar=METAVAR,
         help="period of the slow changes, that of the temperature too (default: 10min)",
-    )  # fmt: skip
+    )
     wind.add_argument(
         "--wind", metavar="RECORDING", help="blow this recording's reference or true wind instead"
     )
@@ -176,11 +176,11 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     number(
         carrier, "--platform-speed", between(0.0, 100.0, "m/s"), "M/S",
         "over ground, with --carrier (default: the carrier's usual one)",
-    )  # fmt: skip
+    )
     number(
         carrier, "--course", between(-360.0, 360.0, "deg"), "DEG",
         "clockwise from north, with --carrier",
-    )  # fmt: skip
+    )
     carrier.add_argument(
         "--follow", metavar="RECORDING", help="move as the platform in this recording"
     )
@@ -193,12 +193,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     number(
         air, "--temperature-amplitude", between(-40.0, 40.0, "K"), "K",
         "of a slow change of the temperature (default: none)",
-    )  # fmt: skip
+    )
     number(air, "--pressure", between(10_000.0, 120_000.0, "Pa"), "PA", "of the air", 101_325.0)
     number(
         air, "--rate", between(0.01, FASTEST_RATE, "per second"), "HZ",
         "of all sampled signals", 20.0,
-    )  # fmt: skip
+    )
 
     faults = parser.add_argument_group("faults of the transport")
     number(faults, "--loss", share, "SHARE", "of messages lost", 0.0)
@@ -206,12 +206,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     faults.add_argument(
         "--jitter", type=seconds_by_unit, metavar=METAVAR,
         help="largest random delay, with its unit, like 50ms (default: none)",
-    )  # fmt: skip
+    )
     number(faults, "--nan", share, "SHARE", "of angles that are NaN", 0.0)
     faults.add_argument(
         "--clock-jump", type=between(-LONGEST, LONGEST, "s"), nargs=2, metavar=("AT", "BY"),
         help="the stamping clock jumps by BY seconds AT seconds after the start",
-    )  # fmt: skip
+    )
     parser.set_defaults(run=run)
 
 
@@ -227,18 +227,18 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(
             "this has no effect on a station without a platform.", "--exact-platform",
             "Leave it out, or add `platform` to the station file.",
-        )  # fmt: skip
+        )
     scenario = _scenario(_completed(args), station)
     begin = time.perf_counter()
     with Progress(
         TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.0f} s of wind"),
         TimeElapsedColumn(), console=console, transient=True,
-    ) as progress:  # fmt: skip
+    ) as progress:
         task = progress.add_task("simulate", total=scenario.duration)
         recording = simulate(
             station, scenario, name_of(args.output),
             progress=lambda done: progress.update(task, completed=done),
-        )  # fmt: skip
+        )
     spent = time.perf_counter() - begin
     recording = _comparable(received(recording, scenario.faults))
     folder = write_recording(args.output, recording, force=args.force)
@@ -334,7 +334,7 @@ def _wind(args: argparse.Namespace, station: Station) -> tuple[TurbulenceSpec | 
         spec = surface_layer_spec(
             args.speed, site.measuring_height, site.roughness_length, args.stability,
             direction=direction, seed=args.seed,
-        )  # fmt: skip
+        )
     else:
         spec = isotropic_spec(
             args.speed, args.intensity, args.integral_length, direction, args.seed

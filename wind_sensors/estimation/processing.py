@@ -68,7 +68,7 @@ def _inputs(
             estimator.add_platform(
                 times[i], states.attitude[i], states.velocity[i], states.angular_rate[i],
                 states.position[i],
-            )  # fmt: skip
+            )
 
         inputs.append((estimator.measured("platform", states.time, zero), platform))
     if recording.temperature is not None:

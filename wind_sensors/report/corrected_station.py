@@ -31,7 +31,7 @@ def corrected_station(
     lines = [
         f"Written by `wind diagnose` (wind_sensors {wind_sensors.__version__}) of the recording "
         f"{recording!r}: {verdict}.",
-        "The station file of the recording, with what was found and 95 % intervals in brackets:"
+        "Found, with 95 % intervals in brackets; of a set it is not known which one holds:"
         if findings
         else "Nothing was named, so the constants are those of the station file.",
     ]

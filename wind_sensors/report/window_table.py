@@ -62,7 +62,7 @@ def wind_quantities(window: WindowStatistics, *, with_vertical: bool) -> list[Qu
             math.degrees(window.direction_uncertainty),
         ),
         Quantity("direction spread", "deg", spread, 0.5 * (most - least)),
-    ]  # fmt: skip
+    ]
     for name, value in zip("uvw"[: 3 if with_vertical else 2], window.turbulence, strict=False):
         quantities.append(Quantity(f"turbulence {name}", "m/s", float(value)))
     if with_vertical:
