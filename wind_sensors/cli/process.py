@@ -110,8 +110,6 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.output).exists() and not args.force:
         clear_target(Path(args.output), force=False)
     console = screen(stderr=True)
-    if must_compile(settings):
-        console.print("Compiling the estimator, once after an installation: about a minute.")
     with Progress(
         TextColumn("estimating the wind"),
         BarColumn(),
@@ -122,6 +120,8 @@ def run(args: argparse.Namespace) -> int:
     ) as progress:
         task = progress.add_task("process", total=1.0)
         recording, others = _read(args.recording, args.station)
+        if must_compile(settings):
+            console.print("Compiling the estimator, once after an installation: about a minute.")
         result = process(
             recording, settings, progress=lambda done: progress.update(task, completed=done)
         )
