@@ -429,8 +429,8 @@ def test_compose_names_the_option(
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        ("record --all -o new --duration nan", "--duration: give a positive number, not 'nan'"),
-        ("record --all -o new --duration -5", "--duration: give a positive number, not '-5'"),
+        ("record --all -o new --duration nan", "--duration: a duration must be positive, not"),
+        ("record --all -o new --duration -5", "--duration: a duration must be positive, not '-5'"),
         ("replay nowhere --rate inf", "--rate: give a positive number, not 'inf'"),
         ("replay nowhere --rate 0", "--rate: give a positive number, not '0'"),
         ("replay nowhere --wait-for -3", "--wait-for: give a whole number from 0, not '-3'"),

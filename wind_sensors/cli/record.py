@@ -12,6 +12,7 @@ from rich.table import Table
 
 from wind_sensors.cli.durations import METAVAR, seconds
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
+from wind_sensors.cli.screen import screen
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -89,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         )
         return made
 
-    console = Console()
+    console = screen()
     begin = time.monotonic()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:

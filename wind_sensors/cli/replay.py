@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from wind_sensors.cli.numbers import count, positive
 from wind_sensors.cli.ros_arguments import add_ros_arguments, ros_arguments
+from wind_sensors.cli.screen import screen
 
 if TYPE_CHECKING:
     from wind_sensors.nodes.player import PlayerNode
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     if not folder.exists():
         raise UserError("there is no such recording.", str(folder), "Check the path.")
     content = read_bag(folder / BAG_FOLDER if (folder / BAG_FOLDER).exists() else folder)
-    console = Console()
+    console = screen()
     for note in content.notes:
         console.print(f"note: {note}")
     topics = args.topics
