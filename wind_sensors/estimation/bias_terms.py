@@ -62,7 +62,8 @@ def response_curvature(rotor: Cup | Propeller) -> float:
 
 def vane_loss(vane: Angle, turbulence: WindowTurbulence) -> float:
     """<v^2> - U^2 <phi^2> [m^2/s^2] that the vane does not show; K94 (54)."""
-    across = dissipation(0.75 * turbulence.small_scales.across, turbulence.speed)
+    speed = max(turbulence.speed, 0.1)
+    across = dissipation(0.75 * turbulence.small_scales.across, speed)
     return inertial_loss(
         vane.distance_constant, vane.damping_ratio, across, one_sided_longitudinal_constant()
     )
