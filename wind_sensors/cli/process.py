@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -229,7 +230,12 @@ def _span(window: WindowStatistics, start: int) -> str:
 
 
 def _told(quantity: Quantity, form: str) -> str:
-    """A number with its uncertainty, where it has one; the columns' headings tell the units."""
+    """A number with its uncertainty, where it has one, or a dash where it was not measured.
+
+    The columns' headings tell the units.
+    """
+    if not math.isfinite(quantity.value):
+        return "-"
     text = format(quantity.value, form)
     if quantity.uncertainty is None:
         return text

@@ -7,12 +7,15 @@ released, sorted and without doubles. The clock is the largest stamp seen (or to
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from wind_sensors.estimation.recent import Tally
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -21,7 +24,8 @@ PULSES, READINGS, PLATFORM, TEMPERATURE, PRESSURE = range(5)
 _CONFIRMED = 3
 """So many messages in a row make a jump of the clock believable."""
 FAR_AHEAD_NS = 60_000_000_000
-"""A stamp further ahead of all others is not believed [ns]."""
+"""A step further ahead is no pause of the signals but another clock [ns]."""
+_KEPT_OFFSETS = 64
 _INTERVALS_AHEAD = 1.5
 """So many intervals between states of the platform are waited for, so that one may be missing."""
 
@@ -58,12 +62,15 @@ class Block:
 
 @dataclass
 class InputRecord:
-    """What is known about one input; counts since the start.
+    """What is known about one input.
 
     Attributes:
         kind: PULSES, READINGS, ...
         width: Numbers in a message.
-        accepted, doubled, late, invalid, gaps: Counts.
+        accepted, doubled, invalid, gaps: Messages that were used, came twice, were no numbers;
+            pauses.
+        late, ahead: Messages left out because their stamps are behind or ahead of the others.
+        offsets: By how much the last of those were ahead of the clock [ns].
         longest_gap: [s].
         first, last: Times of the first and the last released message [ns], 0 without any.
         rate: Recent rate [Hz].
@@ -71,11 +78,13 @@ class InputRecord:
 
     kind: int
     width: int
-    accepted: int = 0
-    doubled: int = 0
-    late: int = 0
-    invalid: int = 0
-    gaps: int = 0
+    accepted: Tally = field(default_factory=Tally)
+    doubled: Tally = field(default_factory=Tally)
+    late: Tally = field(default_factory=Tally)
+    ahead: Tally = field(default_factory=Tally)
+    invalid: Tally = field(default_factory=Tally)
+    gaps: Tally = field(default_factory=Tally)
+    offsets: deque[int] = field(default_factory=lambda: deque(maxlen=_KEPT_OFFSETS))
     longest_gap: float = 0.0
     first: int = 0
     last: int = 0
@@ -83,7 +92,14 @@ class InputRecord:
     times: list[int] = field(default_factory=list)
     values: list[tuple[float, ...]] = field(default_factory=list)
 
+    def set_clock_anew(self) -> None:
+        """The last minute is another one; totals stay."""
+        self.offsets.clear()
+        for tally in (self.accepted, self.doubled, self.late, self.ahead, self.invalid, self.gaps):
+            tally.forget()
 
+
+_Message = tuple[str, int, tuple[float, ...]]
 Correction = Callable[[int, int], int]
 """Stamp and start of the recording to the time of measurement [ns]."""
 
@@ -98,7 +114,7 @@ class Intake:
         look_ahead_ns: How much of the platform's motion after a block is released with it, at
             least and at most; between them as much as a slow source needs for its next state.
         gap_ns: Silence that counts as a gap.
-        jump_ns: Step back of the clock that counts as a jump.
+        jump_ns: Step of the clock, back or ahead, that one message alone does not prove.
     """
 
     def __init__(
@@ -118,19 +134,19 @@ class Intake:
         self._shortest_look_ahead = self._look_ahead
         self._gap = gap_ns
         self._jump = jump_ns
-        self.jumps = 0
-        self.far_ahead = 0
+        self.jumps = Tally()
         self.watermark = 0
         self.origin: int | None = None
         self.released = 0
         self._earliest = 0
         self._zero = 0
         self._seen = False
-        self._early: list[tuple[str, int, tuple[float, ...]]] = []
-        self._astray: list[tuple[str, int, tuple[float, ...]]] = []
+        self._early: list[_Message] = []
+        self._astray: list[_Message] = []
 
     def forget(self) -> None:
         """Start anew with the next message; counts stay."""
+        self._leave_out(self._astray)
         for record in self.records.values():
             record.times.clear()
             record.values.clear()
@@ -148,9 +164,10 @@ class Intake:
             self.watermark = self._earliest = self._true(name, stamp)
         time = self._true(name, stamp)
         ahead = time - self.watermark
-        if ahead < -self._jump or ahead > FAR_AHEAD_NS:
+        if abs(ahead) > self._jump:
             return self._is_jump(name, stamp, value)
-        self._astray.clear()
+        self._leave_out(self._astray)
+        self._astray = []
         if ahead > 0:
             self.watermark = time
         self._keep(name, stamp, value)
@@ -163,35 +180,62 @@ class Intake:
 
     def advance(self, time: int) -> None:
         """Time has passed although no message came."""
-        if self._seen and time > self.watermark and time - self.watermark < FAR_AHEAD_NS:
-            self.watermark = time
+        if not self._seen or not 0 < time - self.watermark < FAR_AHEAD_NS:
+            return
+        held, self._astray = self._astray, []
+        self.watermark = time
+        for message in held:
+            # What was ahead of the clock may be so no more.
+            self.add(*message)
 
     def _is_jump(self, name: str, stamp: int, value: tuple[float, ...]) -> bool:
-        if self._astray:
-            before, last, _ = self._astray[-1]
-            if abs(self._true(name, stamp) - self._true(before, last)) > self._jump:
-                self._astray.clear()
-        self._astray.append((name, stamp, value))
-        if len(self._astray) < _CONFIRMED:
-            self._count_stray(name, stamp, 1)
+        """Hold a message that is far from the others until as many more agree with it."""
+        time = self._true(name, stamp)
+        steps_ahead = time > self.watermark
+        # Signals that pause are followed by stamps ahead, which may be seconds apart.
+        before = FAR_AHEAD_NS if steps_ahead else self._jump
+        agreeing: list[_Message] = []
+        apart: list[_Message] = []
+        for message in self._astray:
+            at = self._true(message[0], message[1])
+            if (at > self.watermark) != steps_ahead or at > time + self._jump:
+                self._leave_out([message])
+            else:
+                (agreeing if at >= time - before else apart).append(message)
+        agreeing.append((name, stamp, value))
+        if len(agreeing) < _CONFIRMED:
+            # The newest may be the stray.
+            self._leave_out(apart[:-_CONFIRMED])
+            self._astray = [*apart[-_CONFIRMED:], *agreeing]
             return False
-        self.jumps += 1
-        return True
+        self._leave_out(apart)
+        self._astray = agreeing
+        if not steps_ahead or time - self.watermark > FAR_AHEAD_NS:
+            return True
+        held, self._astray = self._astray, []
+        self.watermark = max(self._true(n, s) for n, s, _ in held)
+        for message in held:
+            self._keep(*message)
+        return False
 
-    def _count_stray(self, name: str, stamp: int, change: int) -> None:
-        if self._true(name, stamp) < self.watermark:
-            self.records[name].late += change
-        else:
-            self.far_ahead += change
+    def _leave_out(self, strays: list[_Message]) -> None:
+        """Count messages that nothing confirmed."""
+        for name, stamp, _ in strays:
+            record = self.records[name]
+            offset = self._true(name, stamp) - self.watermark
+            (record.ahead if offset > 0 else record.late).add(self.watermark)
+            record.offsets.append(offset)
 
     def restart(self) -> None:
         """After a jump: forget, and begin with the messages that proved it."""
-        proof = list(self._astray)
-        for name, stamp, _ in proof[:-1]:
-            self._count_stray(name, stamp, -1)
+        proof, self._astray = self._astray, []
         self.forget()
+        for record in self.records.values():
+            record.set_clock_anew()
+        self.jumps.forget()
         for name, stamp, value in proof:
             self.add(name, stamp, value)
+        self.jumps.add(self.watermark)
 
     def _keep(self, name: str, stamp: int, value: tuple[float, ...]) -> None:
         time = self._true(name, stamp)
@@ -201,7 +245,8 @@ class Intake:
             return
         record = self.records[name]
         if time < self.released:
-            record.late += 1
+            record.late.add(self.watermark)
+            record.offsets.append(time - self.watermark)
             return
         record.times.append(time)
         record.values.append(value)
@@ -244,7 +289,7 @@ class Intake:
         self.released = stop
         seconds = self._block * 1e-9
         for name, record in self.records.items():
-            self._account(record, parts[name], seconds)
+            self._account(record, parts[name], stop, seconds)
         look_ahead = self._look_ahead
         self._follow_platform_rate()
         return Block(
@@ -287,8 +332,7 @@ class Intake:
             return parts[name]
         return Series(np.empty(0, dtype=np.int64), np.empty((0, 1)))
 
-    @staticmethod
-    def _taken(record: InputRecord, stop: int) -> Series:
+    def _taken(self, record: InputRecord, stop: int) -> Series:
         times, values = record.times, record.values
         if not times:
             return Series(np.empty(0, dtype=np.int64), np.empty((0, record.width)))
@@ -301,16 +345,17 @@ class Intake:
             record.values = [v for t, v in zip(times, values, strict=True) if t >= stop]
             record.times = [t for t in times if t >= stop]
         series, doubled = _sorted(taken_times, taken_values, record.width)
-        record.doubled += doubled
+        if doubled:
+            record.doubled.add(stop, doubled)
         return series
 
-    def _account(self, record: InputRecord, part: Series, seconds: float) -> None:
+    def _account(self, record: InputRecord, part: Series, stop: int, seconds: float) -> None:
         count = int(part.time.size)
         share = min(1.0, seconds / 5.0) if record.rate > 0.0 else 1.0
         record.rate += share * (count / seconds - record.rate)
         if count == 0:
             return
-        record.accepted += count
+        record.accepted.add(stop, count)
         times = part.time
         before = record.last if record.last else int(times[0])
         if before > times[0]:
@@ -318,7 +363,7 @@ class Intake:
         silent = np.diff(times, prepend=before)
         longest = int(silent.max())
         if longest > self._gap:
-            record.gaps += int(np.count_nonzero(silent > self._gap))
+            record.gaps.add(stop, int(np.count_nonzero(silent > self._gap)))
             record.longest_gap = max(record.longest_gap, longest * 1e-9)
         if not record.first:
             record.first = int(times[0])

@@ -48,11 +48,14 @@ class WindowStatistics:
     """Statistics of one averaging window.
 
     Speeds in m/s, angles in rad, `direction` is where the air goes, counter-clockwise from east.
-    Uncertainties are standard deviations.
+    Uncertainties are standard deviations. Everything but `complete` is nan where less than half of
+    the window was measured; `wind_run_mean`, `bias`, `bias_terms`, `raw_scalar_mean` and
+    the variances of direction are where the rotor that is counted, or its vane, was silent for so
+    long; these variances are, too, where that rotor stood still throughout.
 
     Attributes:
         start, stop: First and last moment [ns].
-        complete: Share of the window that had data, 0 to 1.
+        complete: Share of the window in which speed and direction were measured, 0 to 1.
         wind_run_mean: Vector mean by wind run, uncorrected; east, north, shape (2,). Kristensen
             (1994), (83).
         vector_mean: Vector mean after correction; east, north, up, shape (3,).

@@ -212,5 +212,5 @@ def process(
         apparent_covariance=found.apparent_covariance,
         to_earth=found.to_earth,
         windows=tuple(windows),
-        health=tuple(estimator.health()),
+        health=tuple(estimator.health(whole=True)),
     )

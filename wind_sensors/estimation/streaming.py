@@ -15,10 +15,11 @@ from wind_sensors.errors import UserError
 from wind_sensors.estimation.array_methods import InverseArrayCore, NaiveArrayCore
 from wind_sensors.estimation.bivane_sampling import sampling_health
 from wind_sensors.estimation.constants import axes_of, is_array, rotors_of
-from wind_sensors.estimation.core import Core, Estimates, joined, trusted
+from wind_sensors.estimation.core import Core, Estimates, joined, part_of, trusted
 from wind_sensors.estimation.health import (
     bias_health,
     clock_health,
+    estimate_health,
     input_health,
     motion_health,
     window_health,
@@ -38,6 +39,8 @@ from wind_sensors.estimation.kalman import KalmanCore
 from wind_sensors.estimation.kalman_kernel import run
 from wind_sensors.estimation.naive import NaiveCore
 from wind_sensors.estimation.outputs import HealthItem, WindEstimate, WindowStatistics
+from wind_sensors.estimation.presence import Presence
+from wind_sensors.estimation.recent import Tally
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.timeline import changing_correction
 from wind_sensors.estimation.windows import WindowAccumulator
@@ -62,6 +65,8 @@ _SPEED_MEMORY = 0.9
 _LOOK_AHEAD_NS = (100_000_000, 2_000_000_000)
 """Of the platform's motion, so that it can be interpolated at the end of a block; at most this long
 is a slow source waited for."""
+_REACH_OF_FITS = 1.0
+"""The local fits of `inverse` look ahead by less than this over their bandwidth [1]."""
 
 
 def _clock(entry: AnyInstrument | Platform) -> Clock:
@@ -146,13 +151,15 @@ class StreamingEstimator:
         self._angles = {n for n, (kind, _, _) in self._inputs.items() if kind == READINGS}
         self._intake = self._new_intake()
         self._core: Core | None = None
+        self._presence: Presence | None = None
         self._windows = WindowAccumulator(station, settings)
         self._estimates: list[Estimates] = []
         self._finished: list[WindowStatistics] = []
-        self._unknown: dict[str, int] = {}
+        self._unknown: dict[str, Tally] = {}
         self._last_health: list[HealthItem] = []
         self._latest: WindowStatistics | None = None
-        self._refused = 0
+        self._delivered = False
+        self._refused = Tally()
         self._refusing = False
         self._refused_since = 0
         self._apparent_speed = 0.0
@@ -178,17 +185,17 @@ class StreamingEstimator:
             turns: The rotor's total revolutions, where the source tells them.
         """
         if name not in self._rotors:
-            self._unknown[name] = self._unknown.get(name, 0) + 1
+            self._unknown.setdefault(name, Tally()).add(self._intake.watermark)
             return
         self._take(name, time_ns, (math.nan if turns is None else turns,))
 
     def add_angle(self, name: str, time_ns: int, angle: float) -> None:
         """A reading of a vane: heading of its nose, counter-clockwise from x [rad]."""
         if name not in self._angles:
-            self._unknown[name] = self._unknown.get(name, 0) + 1
+            self._unknown.setdefault(name, Tally()).add(self._intake.watermark)
             return
         if not math.isfinite(angle):
-            self._intake.records[name].invalid += 1
+            self._intake.records[name].invalid.add(self._intake.watermark)
             return
         self._take(name, time_ns, (angle,))
 
@@ -209,7 +216,7 @@ class StreamingEstimator:
             for v in np.asarray(part, dtype=np.float64)
         )
         if not all(math.isfinite(v) for v in value[:10]):
-            self._intake.records[_PLATFORM].invalid += 1
+            self._intake.records[_PLATFORM].invalid.add(self._intake.watermark)
             return
         self._take(_PLATFORM, time_ns, value)
 
@@ -223,7 +230,7 @@ class StreamingEstimator:
             if math.isfinite(value):
                 self._take(name, time_ns, (value,))
             else:
-                self._intake.records[name].invalid += 1
+                self._intake.records[name].invalid.add(self._intake.watermark)
 
     def measured(self, name: str, stamps: TimeArray, zero: int) -> TimeArray:
         """Times of measurement [ns] of an input's messages by what is known of its clock.
@@ -253,16 +260,37 @@ class StreamingEstimator:
     def _process(self, blocks: list[Block]) -> None:
         for block in blocks:
             core = self._core
-            if core is None:
+            if core is None or self._presence is None:
                 core = self._core = self._new_core()
-            estimates = self._kept(core.process(block))
-            self._close(self._windows.take(block, estimates, core.small_scales()))
+                self._presence = Presence(self.station, self.settings, block.start)
+            presence = self._presence
+            presence.take(block)
+            found = core.process(block)
+            until = self._final(presence, found, block.stop)
+            estimates = self._kept(found, presence)
+            small = core.small_scales()
+            self._close(self._windows.take(block, estimates, small, presence, until))
 
-    def _kept(self, estimates: Estimates) -> Estimates:
-        """Keep what is no guesswork, and count the rest."""
+    def _final(self, presence: Presence, found: Estimates, stop: int) -> int:
+        """Time [ns] before which no estimate will follow any more, as far as windows wait for it.
+
+        Where nothing is told a window ends without an estimate after it.
+        """
+        latest = int(found.time[-1]) if found.time.size else 0
+        delay = 2.0 * self.settings.smoother_lag + _REACH_OF_FITS / self.settings.bandwidth
+        before = np.array([stop - round(delay * 1e9)], dtype=np.int64)
+        return latest if presence.is_told(before)[0] else max(latest, int(before[0]))
+
+    def _kept(self, estimates: Estimates, presence: Presence) -> Estimates:
+        """Keep what is no guesswork, and count what the motion does not allow."""
+        told = presence.is_told(estimates.time)
+        if not told.all():
+            estimates = part_of(estimates, told)
         known = trusted(estimates)
         if estimates.time.size:
-            self._refused += estimates.time.size - known.time.size
+            if known.time.size < estimates.time.size:
+                refused = estimates.time.size - known.time.size
+                self._refused.add(self._intake.watermark, refused)
             latest = int(estimates.time[-1])
             if known.time.size:
                 self._refused_since = int(known.time[-1]) if known.time[-1] < latest else 0
@@ -272,6 +300,7 @@ class StreamingEstimator:
             self._refusing = silence > self.settings.gap_time * 1e9
         if known.time.size:
             self._estimates.append(known)
+            self._delivered = True
             speed = float(np.linalg.norm(known.apparent, axis=1).mean())
             keep = _SPEED_MEMORY if self._apparent_speed > 0.0 else 0.0
             self._apparent_speed = keep * self._apparent_speed + (1.0 - keep) * speed
@@ -297,9 +326,10 @@ class StreamingEstimator:
 
     def _finish(self) -> None:
         self._process(self._intake.blocks(finish=True))
-        if self._core is not None:
-            estimates = self._kept(self._core.finish())
-            self._close(self._windows.finish(estimates, self._core.small_scales()))
+        if self._core is not None and self._presence is not None:
+            estimates = self._kept(self._core.finish(), self._presence)
+            small = self._core.small_scales()
+            self._close(self._windows.finish(estimates, small, self._presence))
         self._last_health = self._core.health() if self._core is not None else []
         self._core = None
 
@@ -334,20 +364,36 @@ class StreamingEstimator:
         windows, self._finished = self._finished, []
         return windows
 
-    def health(self) -> list[HealthItem]:
-        """State of every input, of the clock and of the estimate."""
-        items = input_health(self._intake, self.station, self.settings)
-        items.append(clock_health(self._intake, self._unknown))
+    def health(self, whole: bool = False) -> list[HealthItem]:
+        """State of every input, of the clock and of the estimate.
+
+        Args:
+            whole: Judge by everything since the start, as of a recording that is over, instead of
+                the last minute; the numbers in `values` always count from the start.
+        """
+        intake = self._intake
+        items = input_health(intake, self.station, self.settings, self._presence, whole)
+        items.append(clock_health(intake, self._unknown, whole))
         if self.station.platform is not None:
-            items.append(motion_health(self._refused, self._refusing))
+            items.append(motion_health(self._refused, self._refusing, intake.watermark, whole))
         core = self._core
-        items += core.health() if core is not None else self._last_health
-        items += sampling_health(
-            self.station, self._intake.records, self.settings, self._apparent_speed
-        )
+        told = core.health() if core is not None else self._last_health
+        missing = estimate_health(intake, self._presence, self._delivered)
+        if missing is not None:
+            told = [*(item for item in told if item.name != missing.name), missing]
+        items += told
+        items += sampling_health(self.station, intake.records, self.settings, self._apparent_speed)
         if self._latest is not None:
-            items += [window_health(self._latest), bias_health(self._latest)]
+            age = (intake.watermark - self._latest.stop) * 1e-9
+            is_old = age > self.settings.window + self._longest_wait
+            items += [window_health(self._latest, is_old), bias_health(self._latest, is_old)]
         return items
+
+    @property
+    def _longest_wait(self) -> float:
+        """From the end of a window to its statistics [s]."""
+        s = self.settings
+        return 4.0 * s.smoother_lag + s.reordering_window + _REACH_OF_FITS / s.bandwidth
 
 
 def must_compile(settings: EstimatorSettings) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,8 @@ from wind_sensors.estimation.bias_terms import (
 from wind_sensors.estimation.constants import is_array, measures_vertical
 from wind_sensors.estimation.core import Estimates, SmallScales
 from wind_sensors.estimation.intake import Block
-from wind_sensors.estimation.outputs import WindowStatistics
+from wind_sensors.estimation.outputs import BiasTerm, WindowStatistics
+from wind_sensors.estimation.presence import Presence
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.site import has_wakes, site_covariance
 from wind_sensors.estimation.wind_run import RunCounter, RunSums
@@ -32,6 +33,9 @@ _CALIBRATION_UNCERTAINTY = 0.002
 """Relative, of a calibration laboratory."""
 _CORRELATION_TIME = 1.0
 """Errors of estimates further apart are independent [s]."""
+_LEAST_MEASURED = 0.5
+"""Of a window of which less was measured no statistics are told."""
+_NO_NUMBER = math.nan
 
 
 @dataclass
@@ -71,9 +75,22 @@ class WindowAccumulator:
         self._sums = _Sums()
 
     def take(
-        self, block: Block, estimates: Estimates, small: SmallScales | None
+        self,
+        block: Block,
+        estimates: Estimates,
+        small: SmallScales | None,
+        presence: Presence,
+        until: int,
     ) -> list[WindowStatistics]:
-        """Add a block and the estimates that became final with it; windows that are complete."""
+        """Add a block and the estimates that became final with it; windows that are complete.
+
+        Args:
+            block: The block.
+            estimates: Those that are told.
+            small: Small scales of the turbulence.
+            presence: Tells how much of a window was measured.
+            until: No estimate before this time will follow [ns].
+        """
         if self._counter is None:
             kind = ArrayRunCounter if is_array(self._station) else RunCounter
             self._counter = kind(
@@ -83,18 +100,22 @@ class WindowAccumulator:
             self._number = 0
         self._counter.take(block)
         self._last = block.stop
-        return self._add(estimates, small)
+        return self._add(estimates, small, presence, until)
 
-    def finish(self, estimates: Estimates, small: SmallScales | None) -> list[WindowStatistics]:
+    def finish(
+        self, estimates: Estimates, small: SmallScales | None, presence: Presence
+    ) -> list[WindowStatistics]:
         """The remaining estimates and the last, shorter window; the next block starts anew."""
-        out = self._add(estimates, small)
+        out = self._add(estimates, small, presence, 0)
         if self._sums.count:
-            out += self._close(min(self._last, self._start + self._length))
+            out += self._close(min(self._last, self._start + self._length), presence)
         self._counter = None
         self._sums = _Sums()
         return out
 
-    def _add(self, estimates: Estimates, small: SmallScales | None) -> list[WindowStatistics]:
+    def _add(
+        self, estimates: Estimates, small: SmallScales | None, presence: Presence, until: int
+    ) -> list[WindowStatistics]:
         out: list[WindowStatistics] = []
         first = 0
         time = estimates.time
@@ -104,8 +125,10 @@ class WindowAccumulator:
             if stop > first:
                 self._accumulate(estimates, slice(first, stop), small)
             if stop < time.size:
-                out += self._close(end)
+                out += self._close(end, presence)
             first = stop
+        while until >= self._start + self._length:
+            out += self._close(self._start + self._length, presence)
         return out
 
     def _accumulate(self, estimates: Estimates, part: slice, small: SmallScales | None) -> None:
@@ -134,7 +157,7 @@ class WindowAccumulator:
             s.across += small.across
             s.blocks += 1
 
-    def _close(self, stop: int) -> list[WindowStatistics]:
+    def _close(self, stop: int, presence: Presence) -> list[WindowStatistics]:
         """Statistics of the current window; the next one begins at `stop`."""
         assert self._counter is not None
         s, run, start = self._sums, self._counter.window(self._number), self._start
@@ -143,9 +166,16 @@ class WindowAccumulator:
         self._sums = _Sums()
         if s.count == 0:
             return []
-        return [self._statistics(s, run, start, stop)]
+        share = presence.share(start, stop)
+        rotor, vane = self._counter.rotor.name, self._counter.vane
+        counted = presence.share(start, stop, rotor, "" if vane is None else vane.name)
+        found = self._statistics(s, run, start, stop, counted >= _LEAST_MEASURED)
+        found = replace(found, complete=min(found.complete, share))
+        return [found if found.complete >= _LEAST_MEASURED else _without_numbers(found)]
 
-    def _statistics(self, s: _Sums, run: RunSums, start: int, stop: int) -> WindowStatistics:
+    def _statistics(
+        self, s: _Sums, run: RunSums, start: int, stop: int, is_counted: bool
+    ) -> WindowStatistics:
         assert self._counter is not None
         duration = max((stop - start) * 1e-9, 1e-9)
         rotor, vane = self._counter.rotor, self._counter.vane
@@ -153,6 +183,9 @@ class WindowAccumulator:
         mean = s.velocity / s.count
         speed = s.speed / s.count
         wind_run, raw_speed = self._raw(run, duration)
+        if not is_counted:
+            # What another rotor or vane told is no error of this one.
+            wind_run, raw_speed = mean[:2], speed
         bias = np.append(wind_run - mean[:2], 0.0)
         fluctuation = s.products / s.count - np.outer(mean, mean) + s.covariance / s.count
         direction = math.atan2(mean[1], mean[0])
@@ -180,13 +213,18 @@ class WindowAccumulator:
             seen, loss = 1.0 - float(np.sum(np.square(s.pointing / s.count))), 0.0
             terms = array_terms(state, float(np.hypot(wind_run[0], wind_run[1])))
         else:
-            seen = 1.0 - float(np.sum(np.square(run.directions))) / max(run.turned, 1e-9) ** 2
+            # Without a run of wind no direction has a weight.
+            seen = _NO_NUMBER
+            if run.turned > 0.0:
+                seen = 1.0 - float(np.sum(np.square(run.directions))) / run.turned**2
             loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
             terms = predicted_terms(rotor, vane, state, arithmetic)
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
         across_variance = float(across_direction @ covariance @ across_direction)
+        # Rounding may leave less than nothing; `max` keeps a nan that comes first.
+        seen = max(seen, 0.0)
         independent = max(duration / _CORRELATION_TIME / 10.0, 1.0)
-        return WindowStatistics(
+        found = WindowStatistics(
             start=start,
             stop=stop,
             complete=min(s.count / (duration * self._settings.output_rate), 1.0),
@@ -201,7 +239,7 @@ class WindowAccumulator:
             direction=direction,
             direction_uncertainty=math.sqrt(across_variance) / max(vector_speed, 0.1),
             direction_variance=seen,
-            corrected_direction_variance=seen + loss,
+            corrected_direction_variance=max(seen + loss, 0.0),
             direction_variance_uncertainty=math.hypot(
                 _CORRECTION_UNCERTAINTY * loss, seen * math.sqrt(2.0 / independent)
             ),
@@ -209,6 +247,7 @@ class WindowAccumulator:
             bias_terms=terms,
             instrument=rotor.name,
         )
+        return found if is_counted else _without_count(found)
 
     def _raw(self, run: RunSums, duration: float) -> tuple[FloatArray, float]:
         """Vector mean by wind run (K94 (83)) and count mean [m/s], by the calibration."""
@@ -241,3 +280,33 @@ class WindowAccumulator:
         if not self._vertical_is_measured:
             mean_covariance[2, 2] = total[2, 2]
         return mean_covariance, bias_covariance
+
+
+def _without_count(window: WindowStatistics) -> WindowStatistics:
+    """A window in which the rotor whose run is counted, or its vane, did not measure."""
+    nothing = BiasTerm(_NO_NUMBER, _NO_NUMBER)
+    return replace(
+        window,
+        wind_run_mean=np.full(2, _NO_NUMBER),
+        bias=np.full(3, _NO_NUMBER),
+        bias_covariance=np.full((3, 3), _NO_NUMBER),
+        raw_scalar_mean=_NO_NUMBER,
+        direction_variance=_NO_NUMBER,
+        corrected_direction_variance=_NO_NUMBER,
+        direction_variance_uncertainty=_NO_NUMBER,
+        bias_terms=dict.fromkeys(window.bias_terms, nothing),
+    )
+
+
+def _without_numbers(window: WindowStatistics) -> WindowStatistics:
+    """A window of which too little was measured."""
+    return replace(
+        _without_count(window),
+        vector_mean=np.full(3, _NO_NUMBER),
+        vector_mean_covariance=np.full((3, 3), _NO_NUMBER),
+        scalar_mean=_NO_NUMBER,
+        scalar_mean_uncertainty=_NO_NUMBER,
+        direction=_NO_NUMBER,
+        direction_uncertainty=_NO_NUMBER,
+        turbulence=np.full(3, _NO_NUMBER),
+    )

@@ -73,9 +73,12 @@ def wind_quantities(window: WindowStatistics, *, with_vertical: bool) -> list[Qu
 
 def told_terms(result: ProcessedRecording) -> list[str]:
     """The bias terms that the station's instruments can have: the others are 0 without doubt."""
-    return [
-        term for term in TERMS if any(any(window.bias_terms[term]) for window in result.windows)
-    ]
+
+    def can_be(term: str) -> bool:
+        known = (n for w in result.windows for n in w.bias_terms[term] if math.isfinite(n))
+        return any(known)
+
+    return [term for term in TERMS if can_be(term)]
 
 
 def bias_quantities(window: WindowStatistics, terms: list[str]) -> list[Quantity]:
