@@ -87,12 +87,16 @@ class Graph:
         while not until():
             late = time.monotonic() >= end
             assert not late, f"what the test waits for never happened {so_far()}"
-            for index, executor in enumerate(self._executors):
-                if index in self._resting:
-                    continue
-                for _ in range(_BATCH):
-                    executor.spin_once(timeout_sec=0.0)
+            self.spin_once()
             time.sleep(0.0005)
+
+    def spin_once(self) -> None:
+        """A turn of every node that does not rest."""
+        for index, executor in enumerate(self._executors):
+            if index in self._resting:
+                continue
+            for _ in range(_BATCH):
+                executor.spin_once(timeout_sec=0.0)
 
     def close(self) -> None:
         """Destroy everything."""

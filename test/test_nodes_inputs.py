@@ -16,9 +16,11 @@ from sensor_msgs.msg import FluidPressure, Temperature
 from std_msgs.msg import Float32, Float64MultiArray, Header, Int64
 
 from wind_sensors.errors import UserError
+from wind_sensors.nodes.diagnostics import Level, Status
 from wind_sensors.nodes.inputs import EstimatorInputs
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.nodes.signal_messages import SignalEncoder
+from wind_sensors.nodes.topic_health import Reason, TopicHealth
 from wind_sensors.recordings import load_station
 from wind_sensors.recordings.bag import BagContent, TopicData, typestore
 from wind_sensors.recordings.reading import signals_of
@@ -64,6 +66,11 @@ def _station(tmp_path: Path, *instruments: str, more: str = "") -> Station:
     lines = "".join(f"- {line}\n" for line in instruments)
     file.write_text(f"instruments:\n{lines}{more}", encoding="utf-8")
     return load_station(file)
+
+
+def _statuses(inputs: EstimatorInputs) -> dict[str, Status]:
+    health = TopicHealth(inputs, lambda: 5, lambda _: Reason(Level.WARN, "nobody."))
+    return {status.name: status for status in health.statuses()}
 
 
 def _through(station: Station) -> tuple[Collector, Any, EstimatorInputs]:
@@ -192,7 +199,7 @@ def test_air_and_counts_that_cannot_be_are_left_out_and_counted(tmp_path: Path) 
     assert {topic: inputs.counts[topic].implausible for topic in ("/t", "/q", "/p")} == {
         "/t": 1, "/q": 1, "/p": 1,
     }  # fmt: skip
-    told = {s.name: s.message for s in inputs.statuses()}
+    told = {name: status.message for name, status in _statuses(inputs).items()}
     assert "1 not plausible" in told["topic /t"] and "`scale`" in told["topic /t"]
 
 
@@ -242,8 +249,7 @@ def test_a_counter_that_begins_anew_is_told(tmp_path: Path) -> None:
     receive = {source.topic: source.receive for source in inputs.sources()}
     for value in (40, 44, 2, 6):
         receive["/p"](Int64(data=value))
-    told = {s.name: s.values for s in inputs.statuses()}
-    assert told["topic /p"]["restarts of a counter"] == "1"
+    assert _statuses(inputs)["topic /p"].values["restarts of a counter"] == "1"
 
 
 def test_edges_without_a_stamp_are_left_out_and_counted(tmp_path: Path) -> None:
@@ -254,8 +260,7 @@ def test_edges_without_a_stamp_are_left_out_and_counted(tmp_path: Path) -> None:
     receive(Header())
     assert not heard.pulses
     assert inputs.counts["/p"].without_stamp == 1
-    (told,) = [s for s in inputs.statuses() if s.name == "topic /p"]
-    assert "1 without a stamp" in told.message
+    assert "1 without a stamp" in _statuses(inputs)["topic /p"].message
 
 
 def test_a_field_that_does_not_exist_is_the_users_error(tmp_path: Path) -> None:

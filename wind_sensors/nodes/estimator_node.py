@@ -16,7 +16,13 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.utilities import remove_ros_args
 
 from wind_sensors.errors import UserError
-from wind_sensors.estimation import EstimatorSettings, make_estimator, must_compile
+from wind_sensors.estimation import (
+    EstimatorSettings,
+    HealthItem,
+    HealthLevel,
+    make_estimator,
+    must_compile,
+)
 from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.estimator_parameters import NODE_PARAMETERS
@@ -35,6 +41,7 @@ from wind_sensors.nodes.station_parameters import (
     station_table,
     station_with,
 )
+from wind_sensors.nodes.topic_health import TopicHealth, graph_reasons
 
 if TYPE_CHECKING:
     from wind_sensors.estimation.outputs import WindEstimate
@@ -102,8 +109,9 @@ class EstimatorNode(Node):
         self.received_at = time.monotonic()
         self._idle_checks = 0
         self._last_estimate: WindEstimate | None = None
+        subscriptions = {}
         for source in self._inputs.sources():
-            subscribe(
+            subscriptions[source.topic] = subscribe(
                 self,
                 source.message_type,
                 source.topic,
@@ -113,6 +121,7 @@ class EstimatorNode(Node):
                     depth=int(number(self._values["input_depth"])),
                 ),
             )
+        self._topics = TopicHealth(self._inputs, self._now, graph_reasons(self, subscriptions))
         listeners = int(number(self._values["wait_for_subscribers"]))
         self._receipts = (
             ReceiptSender(
@@ -127,7 +136,7 @@ class EstimatorNode(Node):
         self._mounting = MountingFromTf(self) if wanted and tf2_is_installed() else None
         self._updater = Updater(
             self,
-            [self._health, self._inputs.statuses],
+            [self._topics.statuses, self._health],
             period=number(self._values["diagnostics_period"]),
         )
         self._idle_timer = self.create_timer(
@@ -240,7 +249,15 @@ class EstimatorNode(Node):
             self._publish()
 
     def _health(self) -> Iterable[Status]:
-        for item in self._estimator.health():
+        items = self._estimator.health()
+        silence = self._topics.silence()
+        knows = any(i.name == "estimate" and i.level >= HealthLevel.ERROR for i in items)
+        if silence > number(self._values["stop_time"]) and not knows:
+            # The estimator knows stamps alone, and those stand still.
+            text = f"No message of a rotor or a vane has come for {silence:.0f} s."
+            items = [item for item in items if item.name != "estimate"]
+            items.append(HealthItem("estimate", HealthLevel.ERROR, text))
+        for item in items:
             yield Status(item.name, Level(item.level), item.message, item.values)
         yield Status(
             "settings",
@@ -279,6 +296,9 @@ class EstimatorNode(Node):
         try:
             values = changed(self._table, self._values, requested)
             station, settings = self._station(values), self._settings(values)
+            if settings.method != self._estimator.settings.method:
+                # Now, before messages wait for it.
+                warm_up(station, settings)
             if station != self.station or settings != self._settings(self._values):
                 self._replace_estimator(station, settings)
         except (ValueError, UserError) as problem:

@@ -7,7 +7,7 @@ What a message means is decided in `station.inputs`, for single messages here an
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, NamedTuple, Protocol
@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
-from wind_sensors.nodes.diagnostics import Level, Status
 from wind_sensors.nodes.platform import ImuWithTwist, odometry_state
 from wind_sensors.station.inputs import (
     LATEST,
@@ -131,6 +130,8 @@ class EstimatorInputs:
     Attributes:
         estimator: Gets the measurements; may be replaced at any time.
         counts: By topic.
+        instruments: Topics of rotors and vanes.
+        event_driven: Topics with edges, of which a rotor at rest sends none.
 
     Raises:
         UserError: A message type is not installed, or has no such field.
@@ -141,6 +142,8 @@ class EstimatorInputs:
     ) -> None:
         self.estimator = estimator
         self.counts: dict[str, TopicCount] = defaultdict(TopicCount)
+        self.instruments: set[str] = set()
+        self.event_driven: set[str] = set()
         self._now = now
         self._handlers: dict[str, list[Handler]] = defaultdict(list)
         self._types: dict[str, str] = {}
@@ -154,41 +157,6 @@ class EstimatorInputs:
             Source(topic, message_class(self._types[topic]), self._receiver(topic))
             for topic in self._handlers
         ]
-
-    def statuses(self) -> Iterable[Status]:
-        """What was wrong with the messages themselves, topic by topic."""
-        for topic, count in self.counts.items():
-            complaints = [
-                f"{number} {what}"
-                for number, what in (
-                    (count.without_stamp, "without a stamp"),
-                    (count.not_numbers, "not a number"),
-                    (count.implausible, "not plausible (check `modulus`, `scale` and `offset`)"),
-                    (count.unusable, f"unusable ({count.problem})"),
-                )
-                if number
-            ]
-            if not count.received:
-                level, message = Level.WARN, "No messages yet: is the topic name right?"
-            elif complaints:
-                level = Level.ERROR if count.unusable else Level.WARN
-                message = f"{', '.join(complaints)} of {count.received} messages were left out."
-            else:
-                level, message = Level.OK, "Messages are arriving."
-            yield Status(
-                f"topic {topic}",
-                level,
-                message,
-                {
-                    "purpose": ", ".join(count.purposes),
-                    "received": str(count.received),
-                    "without stamp": str(count.without_stamp),
-                    "not numbers": str(count.not_numbers),
-                    "not plausible": str(count.implausible),
-                    "unusable": str(count.unusable),
-                    "restarts of a counter": str(count.restarts),
-                },
-            )
 
     def _add(self, source: Input, purpose: str, handler: Handler) -> None:
         known = self._types.setdefault(source.topic, source.type)
@@ -223,8 +191,12 @@ class EstimatorInputs:
             if isinstance(instrument, (Cup, Propeller)):
                 source = resolved(instrument.pulses, "pulses")
                 self._add(source, f"pulses of {instrument.name}", self._rotor(source, instrument))
+                self.instruments.add(source.topic)
+                if source.meaning in ("edge", "edges"):
+                    self.event_driven.add(source.topic)
             else:
                 for signal, source in angle_inputs(instrument).items():
+                    self.instruments.add(source.topic)
                     self._add(source, f"angle of {signal}", self._angle(source, signal))
 
     def _rotor(self, source: Input, rotor: Cup | Propeller) -> Handler:

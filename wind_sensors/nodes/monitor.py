@@ -18,6 +18,7 @@ from rclpy.utilities import remove_ros_args
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.watch import Finding, Watch, WatchSettings
 from wind_sensors.errors import UserError
+from wind_sensors.estimation.recent import MEMORY, Tally
 from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.inputs import EstimatorInputs, message_class, nanoseconds
 from wind_sensors.nodes.parameters import Parameter, Value, declare, describe, number
@@ -28,6 +29,8 @@ from wind_sensors.nodes.station_parameters import (
     station_table,
     station_with,
 )
+from wind_sensors.nodes.topic_health import TopicHealth, graph_reasons, reason_for_silence
+from wind_sensors.nodes.watch_rehearsal import warm_up_watch, watch_must_compile
 from wind_sensors.processes import one_thread_of_linear_algebra
 from wind_sensors.station.inputs import field_path, field_value, resolved, scaled
 from wind_sensors.station.model import Input, Station
@@ -182,17 +185,28 @@ class MonitorNode(Node):
         looks = baseline is not None and settings.drive == "reference"
         self._beside = _process_beside() if looks else None
         self.watch = Watch(self.station, settings, baseline, self._beside)
+        if watch_must_compile():
+            self.get_logger().info(
+                "Compiling the comparison; this happens once after an installation and takes "
+                "about a minute."
+            )
+        warm_up_watch(self.station, settings)
         self._inputs = EstimatorInputs(self.station, self.watch, self._now)
         self._winds = 0
-        self._winds_unusable = 0
+        self._winds_unusable = Tally()
         self._told: Finding | None = None
         quality = input_quality(
             reliable=bool(values["reliable_inputs"]), depth=int(number(values["input_depth"]))
         )
+        subscriptions = {}
         for source in self._inputs.sources():
-            subscribe(self, source.message_type, source.topic, source.receive, quality)
+            subscriptions[source.topic] = subscribe(
+                self, source.message_type, source.topic, source.receive, quality
+            )
+        self._topics = TopicHealth(self._inputs, self._now, graph_reasons(self, subscriptions))
+        self._wind_subscription = None
         if self.reference is not None:
-            subscribe(
+            self._wind_subscription = subscribe(
                 self,
                 message_class(self.reference.type),
                 self.reference.topic,
@@ -201,7 +215,7 @@ class MonitorNode(Node):
             )
         self._updater = Updater(
             self,
-            [self._comparison, self._mismatch, self._past, self._estimate, self._inputs.statuses],
+            [self._topics.statuses, self._comparison, self._mismatch, self._past, self._estimate],
             period=number(values["diagnostics_period"]),
         )
 
@@ -258,11 +272,13 @@ class MonitorNode(Node):
             self._winds += 1
             try:
                 raw = np.array([float(field_value(message, path)) for path in paths])
+                if not np.isfinite(raw).all():
+                    raise ValueError("not a number")
                 header = getattr(message, "header", None)
                 stamp = 0 if header is None else nanoseconds(header.stamp)
                 self.watch.add_wind(stamp or self._now(), scaled(source, raw))
             except (AttributeError, IndexError, OverflowError, TypeError, ValueError):
-                self._winds_unusable += 1
+                self._winds_unusable.add(self._now())
             self._log()
 
         return receive
@@ -283,14 +299,19 @@ class MonitorNode(Node):
             "blocks left out": str(watch.skipped),
             "left out because": watch.skipped_for,
             "nearness of an alarm": f"{watch.alarm_level:.2f}",
+            "unusable winds": str(self._winds_unusable.total),
             "judged by": self._judged_by(),
             "baseline": "healthy recordings" if watch.calibrated else "the first blocks",
         }
-        if watch.latest_wind == 0:
-            text = f"No wind to compare with yet: {self._compared_with()}."
-            yield Status("comparison", Level.STALE, text, values)
-        elif self._winds_unusable:
-            text = f"{self._winds_unusable} messages of {self._compared_with()} were unusable."
+        missing = self._missing()
+        unusable = self._winds_unusable.recent(self._now())
+        if missing:
+            yield Status("comparison", Level.STALE, f"{missing} Nothing is compared.", values)
+        elif unusable:
+            text = (
+                f"{unusable} messages of {self._compared_with()} were unusable within the last "
+                f"{MEMORY} s."
+            )
             yield Status("comparison", Level.WARN, text, values)
         elif not watch.learnt:
             text = "Learning what is normal here."
@@ -301,6 +322,22 @@ class MonitorNode(Node):
             agreed = watch.finding is None
             text = "Signals agree with their simulation." if agreed else "Signals are compared."
             yield Status("comparison", Level.OK, text, values)
+
+    def _missing(self) -> str:
+        """What the comparison lacks now, as a sentence; empty if nothing."""
+        watch = self.watch
+        if watch.latest_wind == 0:
+            why = "nothing usable has come."
+            if self._wind_subscription is not None and self._winds == 0:
+                reason = reason_for_silence(self, self._wind_subscription)
+                why = f"{reason.text} {reason.remedy}".rstrip()
+            return f"No wind to compare with yet: {self._compared_with()}: {why}"
+        if watch.lag > watch.settings.block:
+            return f"No wind from {self._compared_with()} for {watch.lag:.0f} s."
+        silence = self._topics.silence()
+        if silence > watch.settings.block:
+            return f"No message of a rotor or a vane for {silence:.0f} s."
+        return ""
 
     def _judged_by(self) -> str:
         watch = self.watch

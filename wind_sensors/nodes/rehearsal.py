@@ -7,14 +7,16 @@ from functools import partial
 
 import numpy as np
 
-from wind_sensors.estimation import EstimatorSettings, StreamingEstimator, make_estimator
+from wind_sensors.estimation import EstimatorSettings, make_estimator
+from wind_sensors.nodes.inputs import SignalTaker
 from wind_sensors.station.inputs import angle_inputs
 from wind_sensors.station.model import Cup, Propeller, Station
 
 _SECOND = 1_000_000_000
-_START = 1_000 * _SECOND
-_STEP = _SECOND // 20
-_SPEED = 5.0
+START = 1_000 * _SECOND
+STEP = _SECOND // 20
+"""Between two readings [ns]."""
+SPEED = 5.0
 """Of the made-up wind [m/s]."""
 
 
@@ -33,29 +35,45 @@ def warm_up(station: Station, settings: EstimatorSettings) -> None:
     """
     estimator = make_estimator(station, settings)
     seconds = 2.0 * settings.smoother_lag + settings.reordering_window + 3.0
-    stop = _START + round(seconds * _SECOND)
-    calls: list[tuple[int, Callable[[int], None]]] = []
-
-    def schedule(period: int, call: Callable[[int], None]) -> None:
-        calls.extend((time, call) for time in range(_START, stop, period))
-
-    for instrument in station.instruments:
-        if isinstance(instrument, (Cup, Propeller)):
-            turns_per_second = _SPEED / (2.0 * np.pi * instrument.calibration_distance)
-            rate = turns_per_second * instrument.pulses_per_revolution
-            name = instrument.name
-            schedule(round(_SECOND / rate), partial(estimator.add_pulse, name))
-        else:
-            for signal in angle_inputs(instrument):
-                schedule(_STEP, partial(_point_ahead, estimator, signal))
-    if station.platform is not None:
-        upright, still = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
-        schedule(_STEP, lambda time: estimator.add_platform(time, upright, still, still, still))
-    for time, call in sorted(calls, key=lambda item: item[0]):
+    for time, call in made_up_signals(station, estimator, seconds):
         call(time)
     estimator.flush()
     estimator.take_estimates()
 
 
-def _point_ahead(estimator: StreamingEstimator, signal: str, time: int) -> None:
-    estimator.add_angle(signal, time, 0.0)
+def made_up_signals(
+    station: Station, taker: SignalTaker, seconds: float
+) -> list[tuple[int, Callable[[int], None]]]:
+    """Signals of a steady wind of `SPEED` into the sensor's x axis.
+
+    Args:
+        station: Whose instruments speak.
+        taker: Is told.
+        seconds: From `START` on.
+
+    Returns:
+        Times [ns] and what to call with them, in order.
+    """
+    stop = START + round(seconds * _SECOND)
+    calls: list[tuple[int, Callable[[int], None]]] = []
+
+    def schedule(period: int, call: Callable[[int], None]) -> None:
+        calls.extend((time, call) for time in range(START, stop, period))
+
+    for instrument in station.instruments:
+        if isinstance(instrument, (Cup, Propeller)):
+            turns_per_second = SPEED / (2.0 * np.pi * instrument.calibration_distance)
+            rate = turns_per_second * instrument.pulses_per_revolution
+            name = instrument.name
+            schedule(round(_SECOND / rate), partial(taker.add_pulse, name))
+        else:
+            for signal in angle_inputs(instrument):
+                schedule(STEP, partial(_point_ahead, taker, signal))
+    if station.platform is not None:
+        upright, still = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
+        schedule(STEP, lambda time: taker.add_platform(time, upright, still, still, still))
+    return sorted(calls, key=lambda item: item[0])
+
+
+def _point_ahead(taker: SignalTaker, signal: str, time: int) -> None:
+    taker.add_angle(signal, time, 0.0)

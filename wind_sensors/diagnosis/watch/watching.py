@@ -98,6 +98,7 @@ class Watch:
         self._session: int | None = None
         self._begin = 0
         self._latest_wind = 0
+        self._latest_signal = 0
         self._heard: set[str] = set()
         self.blocks = 0
         self.skipped = 0
@@ -147,6 +148,13 @@ class Watch:
         """Stamp of the newest driving wind [ns], 0 before the first."""
         return self._latest_wind
 
+    @property
+    def lag(self) -> float:
+        """How far the driving wind is behind the station's signals [s]; 0 before it was heard."""
+        if self._latest_wind == 0:
+            return 0.0
+        return max((self._latest_signal - self._latest_wind) / _SECOND, 0.0)
+
     def estimate_health(self) -> list[HealthItem]:
         """What the driving estimator says about itself; empty with a reference."""
         if self._estimator is None:
@@ -155,6 +163,7 @@ class Watch:
 
     def add_pulse(self, name: str, time_ns: int, turns: float | None = None) -> None:
         """An edge of a rotor [ns], with its turns so far where the source tells."""
+        self._latest_signal = time_ns
         self._store.add_pulse(name, time_ns, turns)
         if self._estimator is not None and self._drives(name):
             self._estimator.add_pulse(name, time_ns, turns)
@@ -164,6 +173,7 @@ class Watch:
         """A reading of a vane [rad]; what is not a number is left out."""
         if not np.isfinite(angle):
             return
+        self._latest_signal = time_ns
         self._store.add_angle(name, time_ns, angle)
         if self._estimator is not None and self._drives(name):
             self._estimator.add_angle(name, time_ns, angle)
