@@ -19,13 +19,16 @@ from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header, Int32
 
+from wind_sensors.diagnosis.watch import WatchSettings
 from wind_sensors.estimation import EstimatorSettings
 from wind_sensors.nodes import estimator_node
 from wind_sensors.nodes.estimator_node import EstimatorNode
 from wind_sensors.nodes.kinds import CUP_VANE
 from wind_sensors.nodes.monitor import MonitorNode
 from wind_sensors.nodes.quality import advertise, input_quality, output_quality
+from wind_sensors.nodes.watch_rehearsal import warm_up_watch
 from wind_sensors.recordings import load_station
+from wind_sensors.station.model import Input, Reference
 
 OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 SECOND = 1_000_000_000
@@ -87,7 +90,7 @@ class Drivers:
                     wind.vector = Vector3(x=-5.0 + lost, y=0.0, z=0.0)
                     self._wind.publish(wind)
             self._clock.publish(Clock(clock=_stamp(self.time)))
-            for _ in range(20):
+            for _ in range(5):
                 self._graph.spin_once()
 
 
@@ -121,7 +124,7 @@ def test_dead_drivers_end_the_wind_and_a_paused_clock_does_not(graph: Graph) -> 
     graph.spin(lambda: len(diagnostics) >= paused)
     assert {level(n) for n in ("topic /cup/pulses", "topic /vane/joint_states", "estimate")} == {OK}
     last = drivers.time
-    drivers.run(40.0, speaks=False)
+    drivers.run(30.0, speaks=False)
     graph.spin(lambda: level("estimate") == ERROR)
     graph.spin(lambda: level("topic /cup/pulses") == STALE)
     graph.spin(lambda: level("topic /vane/joint_states") == STALE)
@@ -131,7 +134,7 @@ def test_dead_drivers_end_the_wind_and_a_paused_clock_does_not(graph: Graph) -> 
     stop_time = EstimatorSettings().stop_time
     assert stamps[-1] <= last + stop_time * SECOND
     assert all(m.data != m.data for m in speed[3:]), "no mean of a window without data"
-    drivers.run(25.0)
+    drivers.run(12.0)
     graph.spin(lambda: level("estimate") == OK and level("topic /cup/pulses") == OK)
     graph.spin(lambda: stamps_and_velocities(wind)[0][-1] > drivers.time - 3 * SECOND)
 
@@ -170,6 +173,17 @@ def test_a_method_is_warmed_up_before_messages_wait_for_it(
         assert result.successful
     node.set_parameters([Parameter("window", value=60.0)])
     assert warmed == ["naive", "inverse", "naive"]
+
+
+@pytest.mark.parametrize("drive", ["reference", "estimate"])
+@pytest.mark.parametrize("name", ["mast_cup_vane", "usv", "propeller_array"])
+def test_the_monitor_rehearses_a_whole_block(name: str, drive: str) -> None:
+    station = load_station(name)
+    reference = Reference(
+        topic=Input(topic="/reference/wind"), separation=0.5, path_length=0.15
+    )
+    watched = station.model_copy(update={"reference": reference})
+    assert warm_up_watch(watched, WatchSettings(drive=drive))
 
 
 def test_the_monitor_notices_that_its_reference_is_gone_or_no_number(

@@ -26,9 +26,11 @@ class EstimatorSettings:
         bandwidth: Cut-off frequency of `inverse`'s noise filter [Hz].
         window: Averaging time of the window statistics [s]; windows follow one another.
         adaptation_time: Memory of the turbulence estimate [s].
-        stop_time: A rotor without an edge for this long has stopped [s].
+        stop_time: A rotor without an edge for this long has stopped; so long is the wind told
+            after the last sign of life of all rotors and vanes [s].
         gap_time: An input silent for this long has a gap [s].
-        jump_time: A clock that steps back by more than this restarts the estimator [s].
+        jump_time: A clock that steps back by more than this restarts the estimator; a stamp that
+            is ahead by more waits for others that agree [s].
         turbulence_intensity: Assumed until the data have spoken.
         use_air: Use temperature and pressure for the air density where they are measured.
 

@@ -79,7 +79,8 @@ SETTINGS: tuple[Parameter, ...] = (
         "stop_time",
         float,
         _DEFAULTS.stop_time,
-        "A rotor without an edge for this long has stopped [s].",
+        "A rotor without an edge for this long has stopped; so long is the wind told after the "
+        "last sign of life of all rotors and vanes [s].",
         minimum=0.5,
         maximum=600.0,
         changeable=True,
@@ -97,7 +98,8 @@ SETTINGS: tuple[Parameter, ...] = (
         "jump_time",
         float,
         _DEFAULTS.jump_time,
-        "A clock that steps back by more than this restarts the estimator [s].",
+        "A clock that steps back by more than this restarts the estimator; a stamp that is ahead "
+        "by more waits for others that agree [s].",
         minimum=0.5,
         maximum=600.0,
         changeable=True,

@@ -33,7 +33,8 @@ TOPICS: dict[str, str] = {
     "wind/apparent": "TwistWithCovarianceStamped: wind minus sensor velocity, sensor frame",
     "wind/body": "TwistWithCovarianceStamped: `wind` along the axes of a moving platform",
     "wind/vector": "Vector3Stamped: `wind` without covariance, for plots",
-    "wind/mean": "TwistWithCovarianceStamped: corrected vector mean of each window",
+    "wind/mean": "TwistWithCovarianceStamped: corrected vector mean of each window; this and "
+    "the numbers below are nan where less than half of the window was measured",
     "wind/speed": "Float64: corrected scalar mean speed of each window [m/s]",
     "wind/direction_from": "Float64: where the mean wind comes from [deg clockwise from north]",
     "wind/direction_variance": "Float64: of each window, corrected for the vane [rad^2]",
