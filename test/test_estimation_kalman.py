@@ -12,7 +12,9 @@ from wind_sensors.estimation.constants import instruments_of
 from wind_sensors.estimation.filter_state import OUTPUT
 from wind_sensors.estimation.forward import CIRCUMSTANCES, advance_station, advance_with_jacobian
 from wind_sensors.estimation.kalman import KalmanCore
+from wind_sensors.estimation.prediction_kernel import overspeeding
 from wind_sensors.estimation.wind_state import component
+from wind_sensors.station.model import Station
 
 W = turbulence.WIND_STATES
 
@@ -111,6 +113,44 @@ def test_the_smoother_equals_dense_conditioning_on_the_innovations() -> None:
         assert np.allclose(delivered.velocity[at], mean, atol=1e-8)
         found = delivered.covariance[at][:2, :2] - unresolved * np.eye(2)
         assert np.allclose(found, spread[:2, :2], atol=1e-8)
+
+
+@pytest.mark.parametrize("a4", [0.0, 0.6])
+def test_the_second_order_mean_of_a_propeller_that_is_lifted_is_that_of_random_winds(
+    a4: float,
+) -> None:
+    """K94 (30), generalised by a4, averaged over a million winds and rates."""
+    mu2, length, y, unresolved = -0.7, 1.3, 7.8, 0.05
+    propeller = {
+        "kind": "propeller", "name": "p", "pulses": {"topic": "p"}, "pulses_per_revolution": 2,
+        "calibration_distance": 0.05, "distance_constant": length, "mu2": mu2, "a4": a4,
+        "axis": [1.0, 0.0, 0.0],
+    }
+    station = Station.model_validate({"instruments": [propeller]})
+    wind = np.array([7.5, 2.0, 0.4])
+    e, n = wind[:2] / np.hypot(wind[0], wind[1])
+    along = np.array([[e, -n, 0.0], [n, e, 0.0], [0.0, 0.0, 1.0]])
+    spread = along @ np.diag([0.6, 0.4, 0.3]) @ along.T
+    with_rate, rate_variance = np.array([0.2, 0.05, 0.0]), 0.3
+    both = np.block([[spread, with_rate[:, None]], [with_rate[None, :], np.full((1, 1), 0.3)]])
+    both[:3, :3] += unresolved * np.eye(3)
+    generator = np.random.default_rng(4)
+    drawn = generator.multivariate_normal(np.append(wind, y), both, size=500_000)
+    drawn = np.concatenate((drawn, 2.0 * np.append(wind, y) - drawn))
+
+    def acceleration(u: np.ndarray, v: np.ndarray, w: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        slip = (u - rate) * (a4 * np.abs(u) + (1.0 - a4) * rate)
+        return np.asarray((slip + 0.5 * mu2 * (v * v + w * w)) / length)
+
+    excess = acceleration(*drawn.T) - acceleration(wind[0], wind[1], wind[2], np.float64(y))
+    found, _ = overspeeding(
+        instruments_of(station), 0, wind, spread, with_rate, rate_variance, y,
+        calm_circumstances(), 0.0, 0.0, unresolved,
+    )
+    pairs = excess.reshape(2, -1).mean(axis=0)
+    error = pairs.std() / np.sqrt(pairs.size)
+    assert found == pytest.approx(excess.mean(), abs=4.0 * error)
+    assert error < 0.001
 
 
 @pytest.mark.parametrize("speed", [4.0, 9.0])

@@ -236,7 +236,7 @@ def regain_wind(f: FilterState, s: Instruments, r: int, innovation: float) -> No
     c = f.circumstances
     wind = np.empty(3)
     wind_of(f.mean, wind)
-    forcing, _ = forcing_of(s, r, wind, c, phi, 0.0)
+    forcing, _, _ = forcing_of(s, r, wind, c, phi, 0.0)
     y = f.mean[state]
     if forcing > y:
         return

@@ -206,12 +206,11 @@ def rotor_axes(
 @compiled
 def forcing_of(
     s: Instruments, i: int, wind: FloatArray, c: FloatArray, phi: float, air_turn: float
-) -> tuple[float, float]:
-    """Effective forcing A and slope wind B [m/s] of rotor i in an ENU wind."""
+) -> tuple[float, float, float]:
+    """Effective forcing A, slope wind B [m/s] and lift E [m^2/s^2] of rotor i in an ENU wind."""
     local = at_instrument(s, i, apparent(wind, c))
     axial, transverse, _ = rotor_axes(s, i, local, phi, air_turn)
-    a, b, _ = rotor_forcing(rotor_of(s, i), axial, transverse)
-    return a, b
+    return rotor_forcing(rotor_of(s, i), axial, transverse)
 
 
 @compiled

@@ -3,8 +3,9 @@
 The wind part moves linearly (`turbulence_process`), the instruments by their equations of motion
 (`forward`). Because those are not linear, the mean of a rotor's rate is corrected to second order:
 E[(A - y)(a4 B + (1 - a4) y)] differs from its value at the means by
-a4 cov(A, B) + (1 - a4) cov(A, y) - a4 cov(B, y) - (1 - a4) var y. Without this the unresolved
-gusts would overspeed the estimate as they overspeed the rotor.
+a4 cov(A, B) + (1 - a4) cov(A, y) - a4 cov(B, y) - (1 - a4) var y and by what the curvatures of A
+and B in the wind make of its variance; so does the lift E. Without this the unresolved gusts would
+overspeed the estimate as they overspeed the rotor.
 """
 
 from __future__ import annotations
@@ -90,7 +91,8 @@ def overspeeding(
     slope_gradient = np.zeros(3)
     curvature = 0.0
     slope_curvature = 0.0
-    a_0, b_0 = 0.0, 0.0
+    lift_curvature = 0.0
+    a_0, b_0, e_0 = 0.0, 0.0, 0.0
     for k in range(-1, 3):
         along_e, along_n, along_u = 0.0, 0.0, 0.0
         if k == 0:
@@ -107,21 +109,22 @@ def overspeeding(
             + unresolved
         )
         delta = min(math.sqrt(max(variance, 1e-8)), 0.5 * size)
-        ahead, slope_ahead = 0.0, 0.0
+        ahead, slope_ahead, lift_ahead = 0.0, 0.0, 0.0
         for side in range(2):
             sign = 0.0 if k < 0 else (delta if side == 0 else -delta)
             moved[0] = wind[0] + sign * along_e
             moved[1] = wind[1] + sign * along_n
             moved[2] = wind[2] + sign * along_u
-            a, b = forcing_of(s, rotor, moved, c, phi, air_turn)
+            a, b, lift = forcing_of(s, rotor, moved, c, phi, air_turn)
             if k < 0:
-                a_0, b_0 = a, b
+                a_0, b_0, e_0 = a, b, lift
                 break
             if side == 0:
-                ahead, slope_ahead = a, b
+                ahead, slope_ahead, lift_ahead = a, b, lift
                 continue
             curvature += 0.5 * (ahead + a - 2.0 * a_0)
             slope_curvature += 0.5 * (slope_ahead + b - 2.0 * b_0)
+            lift_curvature += 0.5 * (lift_ahead + lift - 2.0 * e_0)
             rise = (ahead - a) / (2.0 * delta)
             gradient[0] += rise * along_e
             gradient[1] += rise * along_n
@@ -145,6 +148,7 @@ def overspeeding(
         + (1.0 - a4) * (with_forcing - rate_variance)
         + (a4 * b_0 + (1.0 - a4) * y) * curvature
         + a4 * (a_0 - y) * slope_curvature
+        + lift_curvature
     )
     density = c[AIR_DENSITY] / s.mounting[rotor, 6]
     factor = density / (s.rotor[rotor, 3] * s.rotor[rotor, 12])
