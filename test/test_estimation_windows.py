@@ -136,6 +136,17 @@ def test_the_inverse_rotor_equation_gives_the_wind_back(
     assert found == pytest.approx(speed, rel=1e-9)
 
 
+@pytest.mark.parametrize("a4", [0.0, 0.4, 1.0, 1.5])
+@pytest.mark.parametrize("y", [3.0, 5.2, 6.5])
+def test_gain_offset_and_slope_of_a_propeller_are_undone_with_its_motion(
+    a4: float, y: float
+) -> None:
+    p = PROPELLER._replace(calibration_offset=0.5, calibration_gain=1.3, a4=a4)
+    forcing, slope, lift = rotor_forcing(p, 4.0 * np.cos(0.3), 4.0 * np.sin(0.3))
+    rate = rotor_acceleration(p, y, 0.0, forcing, slope, lift, (0.0, 0.0), 0.97, 5.0)
+    assert forcing_from_motion(p, y, rate, 0.3, 0.97, 5.0) == pytest.approx(4.0, rel=1e-9)
+
+
 @pytest.mark.parametrize("cable", [{}, {"cable_speed": 1.5, "cable_rest_deg": -130.0}])
 def test_the_inverse_vane_equation_gives_the_direction_back(cable: dict[str, float]) -> None:
     vane = mast(vane={"inertia_factor": 1.4, **cable}).instruments[1]

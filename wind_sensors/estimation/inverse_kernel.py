@@ -155,11 +155,17 @@ def forcing_from_motion(
     friction = bearing_friction(p, y, temperature)
     push = (p.distance_constant * p.inertia_factor * y_rate + friction) / density_ratio
     if p.form == PROPELLER_JACKSON:
+        # (G x + o - y) (a4 x g/f + (1 - a4) y) = push for x = U f.
         f = max(table_at(p.angular_response, angle), 0.2)
-        g = max(torque_slope_ratio(angle), 0.2)
-        root = max(y * y * g * g + 4.0 * f * g * push, 0.0)
-        forcing = (y * g + math.sqrt(root)) / (2.0 * g)
-        return max(forcing / f, 0.0) / p.calibration_gain
+        slope = p.a4 * max(torque_slope_ratio(angle), 0.2) / f
+        free = (y - p.calibration_offset) / p.calibration_gain
+        push /= p.calibration_gain
+        constant = (1.0 - p.a4) * y
+        if slope < 0.05:
+            return max(free + push / max(constant, 0.1), 0.0) / f
+        own = constant + slope * free
+        root = math.sqrt(max(own * own + 4.0 * slope * push, 0.0))
+        return max(free + (root - own) / (2.0 * slope), 0.0) / f
     if p.a4 > 0.05:
         b = (1.0 - 2.0 * p.a4) * y
         root = max(b * b + 4.0 * p.a4 * ((1.0 - p.a4) * y * y + push), 0.0)
