@@ -19,10 +19,13 @@ from wind_sensors.estimation import (
     make_estimator,
     process,
 )
-from wind_sensors.instruments.propeller_array import orthogonal_axes, tripod_axes
+from wind_sensors.estimation.array_equation import FamilyEquation
+from wind_sensors.instruments.dynamics.rotor import rotor_acceleration, rotor_forcing
+from wind_sensors.instruments.propeller_array import orthogonal_axes, solve, tripod_axes
 from wind_sensors.recordings import load_station
 from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Propeller, Station
+from wind_sensors.station.parameters import rotor_parameters
 from wind_sensors.station.signals import Recording, Winds
 from wind_sensors.turbulence.synthesis import isotropic_spec, surface_layer_spec
 
@@ -95,6 +98,60 @@ def test_an_array_comes_close_to_the_information_in_its_signals() -> None:
     assert np.all(result.found > 0.9 * result.bound)
     assert np.all(result.found < result.inverse)
     assert np.all(result.inverse < result.naive)
+
+
+FORMS: dict[str, list[dict[str, object]]] = {
+    "K94, less in oblique wind": [{"mu2": -0.1, "a4": 0.0}] * 3,
+    "K94, more in oblique wind": [{"mu2": 0.3, "a4": 0.0}] * 3,
+    "K94, a4, gain and offset": [{"mu2": 0.2, "a4": 0.5, "calibration_gain": 1.1,
+                                  "calibration_offset": 0.3}] * 3,
+    "Jackson, a4": [{"a4": 0.5}] * 3,
+    "three unlike ones": [{}, {"angular_response_change": -0.3}, {"mu2": 0.2, "a4": 0.2}],
+}
+
+
+@pytest.mark.parametrize("form", list(FORMS))
+def test_each_propellers_own_equation_is_solved(form: str) -> None:
+    """Winds that the equation of motion of the simulation answered with these accelerations."""
+    axes = tripod_axes(DIRECTION, roll=0.7)
+    propellers = [
+        Propeller.model_validate({**i.model_dump(), **more})
+        for i, more in zip(benchmark.station(axes).instruments, FORMS[form], strict=True)
+    ]
+    generator = np.random.default_rng(1)
+    mean = 8.0 * np.array([np.cos(DIRECTION), np.sin(DIRECTION), 0.0])
+    wind = mean + generator.standard_normal((200, 3))
+    along = wind @ axes.T
+    across = np.sqrt(np.sum(wind**2, axis=1)[:, None] - along**2)
+    y = along * generator.uniform(0.8, 1.2, along.shape)
+    push = np.empty_like(y)
+    equations = []
+    for k, propeller in enumerate(propellers):
+        p = rotor_parameters(propeller)._replace(friction=0.0)
+        equations.append(FamilyEquation(p))
+        for n in range(len(wind)):
+            torque = rotor_forcing(p, along[n, k], across[n, k])
+            rate = rotor_acceleration(p, y[n, k], 0.0, *torque, (0.0, 0.0), 1.0, 15.0)
+            push[n, k] = p.distance_constant * rate
+    found = solve(axes, equations, y, push)
+    assert np.all(found.converged)
+    assert not np.any(found.noisy)
+    assert found.velocity == pytest.approx(wind, abs=1e-6)
+
+
+def test_the_inverse_method_takes_each_propellers_own_constants() -> None:
+    axes = tripod_axes(DIRECTION, roll=0.7)
+    one, two, three = benchmark.station(axes).instruments
+    unlike = Station(instruments=(
+        one.model_copy(update={"mu2": 0.2, "a4": 0.0}),
+        two.model_copy(update={"angular_response_change": -0.3}),
+        three,
+    ))
+    wind = isotropic_spec(8.0, 0.05, 60.0, DIRECTION, 5)
+    recording = simulate(unlike, Scenario(wind=wind, duration=60.0, seed=1))
+    result = process(recording, EstimatorSettings(method="inverse", window=60.0, bandwidth=2.0))
+    error, _ = errors_of(result)
+    assert np.all(np.abs(error.mean(axis=0)) < 0.03)
 
 
 def test_wakes_and_planes_of_rotation_are_told() -> None:

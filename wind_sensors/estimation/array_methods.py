@@ -7,17 +7,18 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.estimation.array_equation import FamilyEquation
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
 from wind_sensors.estimation.constants import array_axes, fixed_propellers_of
 from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
-from wind_sensors.estimation.forward import AIR_DENSITY, MOUNT_ROTATION
+from wind_sensors.estimation.forward import AIR_DENSITY, AIR_TEMPERATURE, MOUNT_ROTATION
 from wind_sensors.estimation.history import RotorTrack
 from wind_sensors.estimation.intake import Block
 from wind_sensors.estimation.inverse import GAUSSIAN_WIDTH, rotor_motion
 from wind_sensors.estimation.outputs import HealthItem, HealthLevel
 from wind_sensors.estimation.scale_follower import ScaleFollower
 from wind_sensors.estimation.settings import EstimatorSettings
-from wind_sensors.instruments.friction_propeller import FrictionPropeller
+from wind_sensors.instruments.dynamics.rotor import bearing_friction
 from wind_sensors.instruments.propeller_array import ArrayEstimate, solve, uncorrected_velocity
 from wind_sensors.station.model import Propeller, Station
 from wind_sensors.station.parameters import rotor_parameters
@@ -117,7 +118,7 @@ class NaiveArrayCore(_ArrayCore):
 
 
 class InverseArrayCore(_ArrayCore):
-    """Jackson's equation solved for the wind vector, propeller by propeller.
+    """The propellers' equations of motion solved for the wind vector, each with its own constants.
 
     Args:
         station: The station.
@@ -128,6 +129,7 @@ class InverseArrayCore(_ArrayCore):
     def __init__(self, station: Station, settings: EstimatorSettings, origin: int) -> None:
         width = GAUSSIAN_WIDTH / settings.bandwidth
         super().__init__(station, settings, origin, 4.0 * _REACH * width + 4.0, restored=True)
+        self._equations = [FamilyEquation(rotor_parameters(p)) for p in self._propellers]
         self._width = width
         self._reach = round(_REACH * width * 1e9)
         self._scales = ScaleFollower(settings)
@@ -160,17 +162,18 @@ class InverseArrayCore(_ArrayCore):
         for i, track in enumerate(self._tracks):
             rotor = track.rotor
             assert isinstance(rotor, Propeller)
-            p = rotor_parameters(rotor)
+            p = self._equations[i].p
             slot = 2.0 * np.pi / rotor.pulses_per_revolution
             for k, time in enumerate(times.tolist()):
                 turned = rotor_motion(track, time, self._width, self._stop, stop_ns)
                 y = p.calibration_distance * turned[1]
                 push = p.distance_constant * p.inertia_factor * p.calibration_distance * turned[2]
                 density = rows[k, AIR_DENSITY] / rotor.reference_density
-                shown[k, i] = (y - p.calibration_offset) / p.calibration_gain
-                torque[k, i] = (push + p.friction * np.sign(y)) / (density * p.calibration_gain)
+                friction = bearing_friction(p, y, rows[k, AIR_TEMPERATURE])
+                shown[k, i] = y
+                torque[k, i] = (push + friction * np.sign(y)) / density
                 noise[k] += turned[4] * (p.calibration_distance * slot * _EDGE_DEVIATION) ** 2
-        found = solve(self._axes, self._alike(), shown, torque)
+        found = solve(self._axes, self._equations, shown, torque)
         self._count(found)
         variance = noise / len(self._tracks) + 4.0 / 3.0 * self._scales.unresolved * (
             self._scales.level()
@@ -178,16 +181,6 @@ class InverseArrayCore(_ArrayCore):
         estimates = array_estimates(times, found.velocity, variance, rows)
         self._scales.follow(estimates.velocity)
         return estimates
-
-    def _alike(self) -> FrictionPropeller:
-        """A propeller of unit response length whose other torques stand beside its acceleration."""
-        table = rotor_parameters(self._propellers[0]).angular_response
-        degrees = np.arange(table.size, dtype=np.float64)
-
-        def response(angle: npt.ArrayLike) -> FloatArray:
-            return np.asarray(np.interp(np.degrees(np.asarray(angle)), degrees, table))
-
-        return FrictionPropeller(calibration_distance=1.0, response_length=1.0, f=response)
 
     def _count(self, found: ArrayEstimate) -> None:
         self._solved += int(found.converged.size)

@@ -7,13 +7,17 @@ turns its propeller forward: theta is the angle between the wind velocity and th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.instruments.friction_propeller import (
+    AxialInversion,
     FrictionPropeller,
+    Response,
     invert_axial,
     steady_oblique,
 )
@@ -30,6 +34,60 @@ _LIMIT_ANGLE = 1e-5
 _ANGLE_TOLERANCE = 1e-10
 _FIXED_POINT_STEPS = 60
 _NEWTON_STEPS = 40
+
+
+class AxialEquation(Protocol):
+    """A propeller's equation of motion as `solve` needs it; all arrays have shape (n,)."""
+
+    def component(
+        self, indicated: FloatArray, indicated_rate: FloatArray, speed: FloatArray,
+        angle: FloatArray,
+    ) -> AxialInversion:
+        """Roots for the wind along the axis, U cos(theta) [m/s], at a direction.
+
+        Args:
+            indicated: P omega [m/s].
+            indicated_rate: P domega/dt [m/s^2], or what the equation takes in its place.
+            speed: U of the last guess [m/s].
+            angle: theta of the last guess [rad].
+        """
+
+    def residual(
+        self, indicated: FloatArray, indicated_rate: FloatArray, speed: FloatArray,
+        angle: FloatArray,
+    ) -> FloatArray:
+        """The equation at a trial wind [m^2/s^2], zero where it holds."""
+
+
+@dataclass(frozen=True)
+class JacksonEquation:
+    """Jackson (5) and its roots (10).
+
+    Attributes:
+        propeller: Constants.
+    """
+
+    propeller: FrictionPropeller
+
+    def component(
+        self, indicated: FloatArray, indicated_rate: FloatArray, speed: FloatArray,
+        angle: FloatArray,
+    ) -> AxialInversion:
+        """X cos(theta)/f(theta) [m/s] from (10), which does not ask for the speed."""
+        del speed
+        roots = invert_axial(indicated, indicated_rate, angle, self.propeller)
+        ratio = cosine_over_response(angle, self.propeller.f)
+        return roots._replace(value=roots.value * ratio, other=roots.other * ratio)
+
+    def residual(
+        self, indicated: FloatArray, indicated_rate: FloatArray, speed: FloatArray,
+        angle: FloatArray,
+    ) -> FloatArray:
+        """(5) at a trial wind [m^2/s^2]."""
+        p = self.propeller
+        torque = speed * p.g(angle) * (speed * p.f(angle) - indicated)
+        friction = p.stall_speed**2 * np.sign(indicated)
+        return np.asarray(torque - p.response_length * indicated_rate - friction)
 
 
 @dataclass(frozen=True)
@@ -119,7 +177,7 @@ def uncorrected_velocity(axes: npt.ArrayLike, indicated: npt.ArrayLike) -> Float
 
 def solve(
     axes: npt.ArrayLike,
-    propeller: FrictionPropeller,
+    propellers: FrictionPropeller | Sequence[AxialEquation],
     indicated: npt.ArrayLike,
     indicated_rate: npt.ArrayLike | None = None,
 ) -> ArrayEstimate:
@@ -130,7 +188,7 @@ def solve(
 
     Args:
         axes: Unit vectors, shape (m, 3), m >= 3, spanning space.
-        propeller: Constants, the same for all axes.
+        propellers: Constants, the same for all axes, or one equation for each axis.
         indicated: P omega [m/s], shape (n, m).
         indicated_rate: P domega/dt [m/s^2], shape (n, m); zero (steady) if not given. Take it
             before decimating.
@@ -146,6 +204,10 @@ def solve(
         rate = np.zeros_like(y)
     else:
         rate = np.atleast_2d(np.asarray(indicated_rate, dtype=np.float64))
+    equations: Sequence[AxialEquation] = (
+        [JacksonEquation(propellers)] * unit.shape[0]
+        if isinstance(propellers, FrictionPropeller) else propellers
+    )
     inverse = np.linalg.pinv(unit)
     velocity = y @ inverse.T
     iterations = np.zeros(y.shape[0], dtype=np.int64)
@@ -154,21 +216,19 @@ def solve(
         active = np.flatnonzero(~converged)
         if active.size == 0:
             break
-        angles = wind_angles(unit, velocity[active])
-        roots = invert_axial(y[active], rate[active], angles, propeller)
-        components = roots.value * _cosine_over_response(angles, propeller)
-        updated = components @ inverse.T
+        updated = _roots(unit, equations, y[active], rate[active], velocity[active]).value
+        updated = updated @ inverse.T
         settled = _turn(velocity[active], updated) < _ANGLE_TOLERANCE
         velocity[active] = updated
         iterations[active] = step + 1
         converged[active] = settled
     left = np.flatnonzero(~converged)
     if left.size:
-        velocity[left], settled = _newton(unit, propeller, y[left], rate[left], velocity[left])
+        velocity[left], settled = _newton(unit, equations, y[left], rate[left], velocity[left])
         iterations[left] += _NEWTON_STEPS
         converged[left] = settled
     angles = wind_angles(unit, velocity)
-    roots = invert_axial(y, rate, angles, propeller)
+    roots = _roots(unit, equations, y, rate, velocity)
     return ArrayEstimate(
         velocity=velocity,
         angles=angles,
@@ -185,12 +245,17 @@ def _across(unit: FloatArray, u: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(np.cross(u[..., None, :], unit), axis=-1))
 
 
-def _cosine_over_response(angles: FloatArray, propeller: FrictionPropeller) -> FloatArray:
-    """cos(theta)/f(theta), by its limit close to 90 degrees where both vanish."""
+def cosine_over_response(angles: FloatArray, f: Response) -> FloatArray:
+    """cos(theta)/f(theta) [1], by its limit close to 90 degrees where both vanish.
+
+    Args:
+        angles: theta [rad].
+        f: Angular response.
+    """
     offset = angles - 0.5 * math.pi
     shifted = 0.5 * math.pi + np.where(offset >= 0.0, _LIMIT_ANGLE, -_LIMIT_ANGLE)
     theta = np.where(np.abs(offset) < _LIMIT_ANGLE, shifted, angles)
-    response = np.asarray(propeller.f(theta), dtype=np.float64)
+    response = np.asarray(f(theta), dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.cos(theta) / response
     # A table whose zero lies a little off 90 degrees must not blow the component up.
@@ -203,30 +268,49 @@ def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
     return np.asarray(change / np.maximum(np.linalg.norm(after, axis=1), 1e-12))
 
 
+def _roots(
+    unit: FloatArray,
+    equations: Sequence[AxialEquation],
+    y: FloatArray,
+    rate: FloatArray,
+    velocity: FloatArray,
+) -> AxialInversion:
+    """Components of all propellers at the directions of a guess, shape (n, m) each."""
+    speed = np.linalg.norm(velocity, axis=1)
+    angles = wind_angles(unit, velocity)
+    each = [
+        equation.component(y[:, k], rate[:, k], speed, angles[:, k])
+        for k, equation in enumerate(equations)
+    ]
+    return AxialInversion(*(np.stack(columns, axis=1) for columns in zip(*each, strict=True)))
+
+
 def _residual(
     unit: FloatArray,
-    propeller: FrictionPropeller,
+    equations: Sequence[AxialEquation],
     y: FloatArray,
     rate: FloatArray,
     velocity: FloatArray,
 ) -> FloatArray:
-    """Equation (5) at a trial wind [m^2/s^2], shape (n, m)."""
-    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    """All propellers' equations at a trial wind [m^2/s^2], shape (n, m)."""
+    speed = np.linalg.norm(velocity, axis=1)
     angles = wind_angles(unit, velocity)
-    torque = speed * propeller.g(angles) * (speed * propeller.f(angles) - y)
-    friction = propeller.stall_speed**2 * np.sign(y)
-    return np.asarray(torque - propeller.response_length * rate - friction)
+    columns = [
+        equation.residual(y[:, k], rate[:, k], speed, angles[:, k])
+        for k, equation in enumerate(equations)
+    ]
+    return np.stack(columns, axis=1)
 
 
 def _newton(
     unit: FloatArray,
-    propeller: FrictionPropeller,
+    equations: Sequence[AxialEquation],
     y: FloatArray,
     rate: FloatArray,
     start: FloatArray,
 ) -> tuple[FloatArray, BoolArray]:
     velocity = start.copy()
-    misfit = _residual(unit, propeller, y, rate, velocity)
+    misfit = _residual(unit, equations, y, rate, velocity)
     settled = np.zeros(y.shape[0], dtype=bool)
     for _ in range(_NEWTON_STEPS):
         scale = np.maximum(np.linalg.norm(velocity, axis=1), 0.1)
@@ -234,8 +318,8 @@ def _newton(
         for axis in range(3):
             nudge = np.zeros_like(velocity)
             nudge[:, axis] = 1e-6 * scale
-            above = _residual(unit, propeller, y, rate, velocity + nudge)
-            below = _residual(unit, propeller, y, rate, velocity - nudge)
+            above = _residual(unit, equations, y, rate, velocity + nudge)
+            below = _residual(unit, equations, y, rate, velocity - nudge)
             jacobian[:, :, axis] = (above - below) / (2e-6 * scale)[:, None]
         change = -np.einsum("nij,nj->ni", np.linalg.pinv(jacobian), misfit)
         length = np.linalg.norm(change, axis=1)
@@ -244,7 +328,7 @@ def _newton(
         shrink = np.ones(y.shape[0])
         for _ in range(12):
             trial = velocity + shrink[:, None] * change
-            trial_misfit = _residual(unit, propeller, y, rate, trial)
+            trial_misfit = _residual(unit, equations, y, rate, trial)
             worse = np.linalg.norm(trial_misfit, axis=1) > size
             if not np.any(worse):
                 break
