@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -194,6 +195,25 @@ def test_edges_alone_do_not_tell_the_sense_of_rotation() -> None:
     assert item.level == HealthLevel.WARN
     error, _ = errors_of(result)
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) < 0.15)
+
+
+def test_a_shipped_propeller_is_followed_after_a_calm() -> None:
+    """The rotor that makes the signals starts by itself, as one on a mast does."""
+    station = load_station("mast_propeller_vane")
+    t = np.arange(2401) * 0.05
+    speed = np.interp(t, [0.0, 30.0, 40.0, 70.0, 80.0, 120.0], [6.0, 6.0, 0.05, 0.05, 6.0, 6.0])
+    wind = speed[:, None] * np.array([np.cos(DIRECTION), np.sin(DIRECTION), 0.0])
+    real = tuple(
+        i.model_copy(update={"a4": 0.33}) if isinstance(i, Propeller) else i
+        for i in station.instruments
+    )
+    blown = Winds((t * 1e9).round().astype(np.int64), wind)
+    recording = simulate(
+        station.model_copy(update={"instruments": real}), Scenario(wind=blown, duration=119.0)
+    )
+    result = process(replace(recording, station=station), EstimatorSettings(window=120.0))
+    error, _ = errors_of(result, skip=85.0)
+    assert np.all(np.abs(error[:, :2]).mean(axis=0) < 0.1)
 
 
 def test_propellers_along_one_line_are_no_array() -> None:

@@ -133,8 +133,8 @@ def predicted_terms(
     eps = dissipation(turbulence.small_scales.along, speed)
     local = inertial_bias(
         rotor.distance_constant * rotor.inertia_factor, eps, speed, 0.0,
-        turbulence.vertical_variance, rotor.a4, 0.0, mu2,
-    )  # fmt: skip
+        turbulence.vertical_variance, rotor_parameters(rotor).a4, 0.0, mu2,
+    )
     across = dissipation(0.75 * turbulence.small_scales.across, speed)
     translation = 0.0
     if isinstance(rotor, Propeller) and rotor.mounted_on:
