@@ -155,6 +155,34 @@ def test_the_inverse_method_takes_each_propellers_own_constants() -> None:
     assert np.all(np.abs(error.mean(axis=0)) < 0.03)
 
 
+def test_the_wind_run_of_an_array_is_counted_with_its_gains_and_offsets() -> None:
+    known = (
+        {"calibration_offset": 0.5, "calibration_gain": 1.2}, {"calibration_offset": -0.3}, {},
+    )
+    axes = tripod_axes(DIRECTION)
+    off = Station(instruments=tuple(
+        i.model_copy(update=more)
+        for i, more in zip(benchmark.station(axes).instruments, known, strict=True)
+    ))
+    t = np.arange(1201) * 0.05
+    wind = np.tile([8.0 * np.cos(DIRECTION), 8.0 * np.sin(DIRECTION), 0.0], (t.size, 1))
+    recording = simulate(
+        off, Scenario(wind=Winds((t * 1e9).round().astype(np.int64), wind), duration=60.0)
+    )
+    (window,) = process(recording, EstimatorSettings(window=60.0)).windows
+    # What the cosine leaves: stall speed and response table, the same without the deviations.
+    plain = replace(recording, station=benchmark.station(axes))
+    (unaware,) = process(plain, EstimatorSettings(window=60.0)).windows
+    healthy = simulate(
+        benchmark.station(axes),
+        Scenario(wind=Winds((t * 1e9).round().astype(np.int64), wind), duration=60.0),
+    )
+    (expected,) = process(healthy, EstimatorSettings(window=60.0)).windows
+    assert window.wind_run_mean == pytest.approx(expected.wind_run_mean, abs=0.03)
+    assert window.raw_scalar_mean == pytest.approx(expected.raw_scalar_mean, abs=0.03)
+    assert np.abs(unaware.wind_run_mean - expected.wind_run_mean).max() > 0.3
+
+
 def test_wakes_and_planes_of_rotation_are_told() -> None:
     level = process(gusts(orthogonal_axes()), EstimatorSettings())
     assert health(level)["propeller_2 angle"] == HealthLevel.WARN

@@ -17,14 +17,15 @@ FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 _SAMPLES = 5
-"""So often in a block the mount's velocity is noted."""
+"""So often in a block the mount's motion is noted."""
 
 
 class ArrayRunCounter:
     """Vector wind run of an array as its calibration gives it, in windows that follow one another.
 
     Every turn of a propeller is a run of air along its column of the axes' pseudo-inverse, turned
-    into the earth frame. `RunSums.directions` is scaled by the first propeller's calibration.
+    into the earth frame; what is known of the steady calibration (gain, offset) is undone.
+    `RunSums.directions` is scaled by the first propeller's calibration.
 
     Args:
         station: The station; its fixed propellers are used.
@@ -40,6 +41,10 @@ class ArrayRunCounter:
     def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
         self._propellers = fixed_propellers_of(station)
         self._columns = np.asarray(np.linalg.pinv(array_axes(self._propellers)), dtype=np.float64)
+        # Wind at which all propellers would stand still, in sensor axes [m/s].
+        self._offset: FloatArray = self._columns @ np.array(
+            [-p.calibration_offset / p.calibration_gain for p in self._propellers]
+        )
         self._tracks = [RotorTrack(p.name, station, start) for p in self._propellers]
         self._angle: list[float | None] = [None] * len(self._propellers)
         self._source = CircumstanceSource(station, use_air)
@@ -52,10 +57,12 @@ class ArrayRunCounter:
         self._source.take(block)
         step = (block.stop - block.start) // _SAMPLES
         times = block.start + step * np.arange(_SAMPLES, dtype=np.int64)
-        carried = self._source.at(times, np.zeros(3))[:, :2]
+        rows = self._source.at(times, np.zeros(3))
+        offset = (self._to_earth(rows) @ self._offset)[:, :2]
         for sums, part in self._windows.at(times):
             sums.readings += int(np.count_nonzero(part))
-            sums.carried += carried[part].sum(axis=0)
+            sums.carried += rows[part, :2].sum(axis=0)
+            sums.time_directions += offset[part].sum(axis=0)
         for i, track in enumerate(self._tracks):
             new = track.take(block.pulses[self._propellers[i].name])
             if new:
@@ -63,21 +70,22 @@ class ArrayRunCounter:
             track.forget_before(block.stop)
 
     def window(self, number: int) -> RunSums:
-        """Sums of a window, which is forgotten; its size of the vector stands for the turns."""
-        sums = self._windows.taken(number)
-        sums.turned = float(np.hypot(*sums.directions))
-        return sums
+        """Sums of a window, which is forgotten."""
+        return self._windows.taken(number)
+
+    @staticmethod
+    def _to_earth(rows: FloatArray) -> FloatArray:
+        return rows[:, MOUNT_ROTATION : MOUNT_ROTATION + 9].reshape(-1, 3, 3)
 
     def _sum_turns(self, i: int, times: TimeArray, angle: FloatArray) -> None:
         before = self._angle[i]
         turned = np.diff(angle, prepend=angle[0] if before is None else before)
         self._angle[i] = float(angle[-1])
         rows = self._source.at(times, np.zeros(3))
-        to_earth = rows[:, MOUNT_ROTATION : MOUNT_ROTATION + 9].reshape(-1, 3, 3)
         propeller = self._propellers[i]
         scale = propeller.calibration_distance / self.rotor.calibration_distance
         scale /= propeller.calibration_gain
-        runs = scale * turned[:, np.newaxis] * (to_earth @ self._columns[:, i])[:, :2]
+        runs = scale * turned[:, np.newaxis] * (self._to_earth(rows) @ self._columns[:, i])[:, :2]
         for sums, part in self._windows.at(times):
             sums.edges += int(np.count_nonzero(part))
             sums.directions += runs[part].sum(axis=0)

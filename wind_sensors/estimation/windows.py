@@ -250,14 +250,19 @@ class WindowAccumulator:
         return found if is_counted else _without_count(found)
 
     def _raw(self, run: RunSums, duration: float) -> tuple[FloatArray, float]:
-        """Vector mean by wind run (K94 (83)) and count mean [m/s], by the calibration."""
+        """Vector mean by wind run (K94 (83)) and count mean [m/s], by the calibration.
+
+        Of an array, which counts no speed, the size of the vector stands for the second.
+        """
         assert self._counter is not None
         length = self._counter.rotor.calibration_distance
         readings = max(run.readings, 1)
         moving = 1.0 if run.edges else 0.0
-        vector = length * run.directions / duration
-        vector = vector + (moving * run.time_directions + run.carried) / readings
-        return vector, length * run.turned / duration + moving * run.offsets / readings
+        vector = length * run.directions / duration + moving * run.time_directions / readings
+        told = length * run.turned / duration + moving * run.offsets / readings
+        if self._counter.vane is None:
+            told = float(np.hypot(vector[0], vector[1]))
+        return vector + run.carried / readings, told
 
     def _uncertainty(
         self, s: _Sums, speed: float, raw_speed: float, bias: FloatArray, duration: float
