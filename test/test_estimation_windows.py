@@ -68,6 +68,19 @@ def test_the_wind_run_is_counted_with_what_is_known_of_the_count_and_the_calibra
     assert plain.raw_scalar_mean < 0.6 * true
 
 
+def test_what_the_vertical_wind_may_be_is_no_uncertainty_of_the_horizontal_mean() -> None:
+    found = process(blown(mast({"mu2": 0.0}), duration=60.0), EstimatorSettings(window=60.0))
+    (window,) = found.windows
+    used = (found.time >= window.start) & (found.time < window.stop)
+    averaged = found.covariance[used].mean(axis=0) / 60.0
+    assert averaged[2, 2] > 4.0 * averaged[0, 0]
+    # Beside the estimates' own errors: 0.2 % of calibration and a quarter of the correction.
+    correction = max(np.hypot(*window.bias[:2]), abs(window.raw_scalar_mean - window.scalar_mean))
+    common = (0.002 * window.scalar_mean) ** 2 + (0.25 * correction) ** 2
+    told = window.vector_mean_covariance[:2, :2]
+    assert told == pytest.approx(averaged[:2, :2] + common * np.eye(2), rel=1e-6, abs=1e-9)
+
+
 def test_an_error_of_a_wake_does_not_average_out() -> None:
     shadow = {"bearing_from_deg": 203.0, "depth": 0.25, "width_deg": 30.0}
     healthy, wake = (

@@ -46,7 +46,7 @@ class _Sums:
     velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
     products: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
-    own_trace: float = 0.0
+    own: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     mount: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     speed: float = 0.0
     pointing: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -148,8 +148,9 @@ class WindowAccumulator:
         if has_wakes(self._station):
             # An error in a wake's depth stays while the wind stays in the wake.
             own = own - site_covariance(self._station, estimates.apparent[part])
-        s.own_trace += float(np.trace(own, axis1=1, axis2=2).sum())
-        s.mount += (p - turn @ own @ turn.transpose(0, 2, 1)).sum(axis=0)
+        own = turn @ own @ turn.transpose(0, 2, 1)
+        s.own += own.sum(axis=0)
+        s.mount += (p - own).sum(axis=0)
         s.speed += float(np.sum(h + 0.5 * across / safe))
         s.pointing += (east.sum(), north.sum())
         if small is not None:
@@ -272,16 +273,13 @@ class WindowAccumulator:
         The instruments' own errors average out over the window, those of the mount's attitude and
         velocity, of the calibration and of the correction do not.
         """
-        own = s.own_trace / s.count / 3.0
         total = s.covariance / s.count
-        averaged = own * min(_CORRELATION_TIME / duration, 1.0)
+        averaged = s.own / s.count * min(_CORRELATION_TIME / duration, 1.0)
         local = abs(raw_speed - speed) if self._station.platform is None else 0.0
         correction = _CORRECTION_UNCERTAINTY * max(float(np.hypot(bias[0], bias[1])), local)
         bias_covariance = np.diag([correction**2, correction**2, 0.0])
-        mean_covariance = np.eye(3) * (
-            averaged + (_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2
-        )
-        mean_covariance += s.mount / s.count
+        mean_covariance = averaged + s.mount / s.count
+        mean_covariance += np.eye(3) * ((_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2)
         if not self._vertical_is_measured:
             mean_covariance[2, 2] = total[2, 2]
         return mean_covariance, bias_covariance
