@@ -81,6 +81,24 @@ def test_what_the_vertical_wind_may_be_is_no_uncertainty_of_the_horizontal_mean(
     assert told == pytest.approx(averaged[:2, :2] + common * np.eye(2), rel=1e-6, abs=1e-9)
 
 
+def test_an_oblique_response_is_uncertain_by_the_vertical_variance_that_nobody_measured() -> None:
+    """Isotropic turbulence: its vertical variance is not that of a neutral surface layer."""
+    recording = blown(mast({"mu2": 1.3}), duration=200.0, intensity=0.15, sample_rate=50.0)
+    found = process(recording, EstimatorSettings(window=200.0))
+    (window,) = found.windows
+    inside = (found.time >= window.start) & (found.time < window.stop)
+    truth = truth_at(recording, found.time)[inside].mean(axis=0)[:2]
+    along = truth / np.hypot(*truth)
+    error = along @ (window.vector_mean[:2] - truth)
+    variance = along @ window.vector_mean_covariance[:2, :2] @ along
+    told = (window.bias_terms["w"].uncertainty * window.scalar_mean) ** 2
+    assert error > 3.0 * np.sqrt(variance - told)
+    assert error < 3.0 * np.sqrt(variance)
+    across = np.array([-along[1], along[0]])
+    assert across @ window.bias_covariance[:2, :2] @ across < told
+    assert along @ window.bias_covariance[:2, :2] @ along > told
+
+
 def test_an_error_of_a_wake_does_not_average_out() -> None:
     shadow = {"bearing_from_deg": 203.0, "depth": 0.25, "width_deg": 30.0}
     healthy, wake = (

@@ -21,8 +21,11 @@ from wind_sensors.turbulence.inertial_range import (
 
 _LEVEL_UNCERTAINTY = 0.2
 """Relative, of an inertial-range level and of a4 together."""
-_VERTICAL_UNCERTAINTY = 0.4
-"""Relative: the vertical variance is inferred, not measured."""
+_INFERRED_VERTICAL = 1.5
+"""Relative, of a vertical variance inferred as that of a neutral surface layer: convection doubles
+it, in isotropic turbulence it is four times as large."""
+_MEASURED_VERTICAL = 0.2
+"""Relative, of a measured one with mu2."""
 _CURVATURE_ANGLE = math.radians(20.0)
 """Where an angular-response table is compared with a parabola."""
 
@@ -34,12 +37,14 @@ class WindowTurbulence(NamedTuple):
         speed: Scalar mean [m/s].
         vector_speed: Speed of the vector mean [m/s].
         vertical_variance: [m^2/s^2].
+        vertical_is_measured: Whether it was measured, not inferred.
         small_scales: Inertial range.
     """
 
     speed: float
     vector_speed: float
     vertical_variance: float
+    vertical_is_measured: bool
     small_scales: SmallScales
 
 
@@ -135,6 +140,7 @@ def predicted_terms(
         rotor.distance_constant * rotor.inertia_factor, eps, speed, 0.0,
         turbulence.vertical_variance, rotor_parameters(rotor).a4, 0.0, mu2,
     )
+    vertical = _MEASURED_VERTICAL if turbulence.vertical_is_measured else _INFERRED_VERTICAL
     across = dissipation(0.75 * turbulence.small_scales.across, speed)
     translation = 0.0
     if isinstance(rotor, Propeller) and rotor.mounted_on:
@@ -148,7 +154,7 @@ def predicted_terms(
     return {
         "u": BiasTerm(local.u, _LEVEL_UNCERTAINTY * abs(local.u)),
         "v": _excess_of_scalar_mean(turbulence),
-        "w": BiasTerm(local.w, _VERTICAL_UNCERTAINTY * abs(local.w)),
+        "w": BiasTerm(local.w, vertical * abs(local.w)),
         "vane_lag": BiasTerm(lag, _LEVEL_UNCERTAINTY * abs(lag)),
         "translation": BiasTerm(translation, _LEVEL_UNCERTAINTY * abs(translation)),
         "arithmetic_mean": BiasTerm(arithmetic_mean, 0.0),

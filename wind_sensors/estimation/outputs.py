@@ -21,7 +21,8 @@ class WindEstimate(NamedTuple):
     Attributes:
         time: When the wind blew [ns].
         velocity: Where the air goes: east, north, up [m/s], shape (3,). The vertical component is
-            not measured by a horizontal station: its variance says so.
+            not measured by a horizontal station: its variance says so, as large as that of a
+            neutral surface layer with the cross-wind's small scales.
         covariance: Of `velocity` [m^2/s^2], shape (3, 3).
         apparent: Wind minus the sensor's velocity, in the sensor frame (x, y, z) [m/s], shape (3,).
         apparent_covariance: Of `apparent` [m^2/s^2], shape (3, 3).
@@ -59,7 +60,8 @@ class WindowStatistics:
         wind_run_mean: Vector mean by wind run, uncorrected; east, north, shape (2,). Kristensen
             (1994), (83).
         vector_mean: Vector mean after correction; east, north, up, shape (3,).
-        vector_mean_covariance: Of `vector_mean` [m^2/s^2], shape (3, 3).
+        vector_mean_covariance: Of `vector_mean` [m^2/s^2], shape (3, 3). Where the vertical wind is
+            not measured, it allows for a vertical variance 2.5 times as large as assumed.
         bias: The velocity that was removed from the wind-run mean; east, north, up, shape (3,).
         bias_covariance: Of `bias` [m^2/s^2], shape (3, 3).
         raw_scalar_mean: Count mean of the rotor by its calibration, nan without pulses.

@@ -201,7 +201,7 @@ class WindowAccumulator:
         blocks = max(s.blocks, 1)
         vector_speed = float(np.hypot(mean[0], mean[1]))
         state = WindowTurbulence(
-            speed, vector_speed, float(fluctuation[2, 2]),
+            speed, vector_speed, float(fluctuation[2, 2]), self._vertical_is_measured,
             SmallScales(s.along / blocks, s.across / blocks),
         )  # fmt: skip
         arithmetic = 0.0
@@ -209,7 +209,6 @@ class WindowAccumulator:
             mean_rate = run.interval_turned / run.interval_time
             offset = run.offsets / max(run.readings, 1) / length
             arithmetic = (run.rates / run.intervals + offset) / (mean_rate + offset) - 1.0
-        covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
         if vane is None:
             seen, loss = 1.0 - float(np.sum(np.square(s.pointing / s.count))), 0.0
             terms = array_terms(state, float(np.hypot(wind_run[0], wind_run[1])))
@@ -220,6 +219,9 @@ class WindowAccumulator:
                 seen = 1.0 - float(np.sum(np.square(run.directions))) / run.turned**2
             loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
             terms = predicted_terms(rotor, vane, state, arithmetic)
+        covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
+        vertical = (terms["w"].uncertainty * speed) ** 2 * np.outer(turn[0], turn[0])
+        covariance, bias_covariance = covariance + vertical, bias_covariance + vertical
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
         across_variance = float(across_direction @ covariance @ across_direction)
         # Rounding may leave less than nothing; `max` keeps a nan that comes first.
