@@ -27,16 +27,29 @@ def test_raw_means_are_those_of_the_pulse_formulas() -> None:
     recording = blown(station, duration=100.0)
     window = process(recording, EstimatorSettings(window=200.0)).windows[0]
     edges = (recording.pulses["cup"].time - recording.start) * 1e-9
-    direct = mean_speed(np.diff(edges), 0.14, 4.0)
+    direct = mean_speed(np.diff(edges[::4]), 0.14)
     assert window.raw_scalar_mean == pytest.approx(direct.count_mean, rel=0.004)
     ratio = direct.arithmetic_mean / direct.count_mean - 1.0
-    assert window.bias_terms["arithmetic_mean"].value == pytest.approx(ratio, rel=0.01)
+    assert window.bias_terms["arithmetic_mean"].value == pytest.approx(ratio, rel=0.05)
     vane = recording.angles["vane"]
     heading = np.interp(edges, (vane.time - recording.start) * 1e-9, np.unwrap(vane.angle))
     duration = (window.stop - window.start) * 1e-9
     run = vector_wind_run(heading + np.pi, duration, 0.14, 4.0)
     assert np.hypot(*window.wind_run_mean) == pytest.approx(run.speed, rel=0.002)
     assert np.arctan2(*window.wind_run_mean[::-1]) == pytest.approx(run.heading, abs=1e-3)
+
+
+@pytest.mark.parametrize("displaced", [0.0, 0.1])
+def test_slots_of_unequal_width_are_no_gusts(displaced: float) -> None:
+    """In a constant wind the mean over turns is that over time: K94 (28) without a variance."""
+    quiet = blown(mast(), duration=60.0, intensity=0.0)
+    turn = 2.0 * np.pi * 0.14 / 8.0
+    slots = np.array([0.0, 0.25 + 0.25 * displaced, 0.5, 0.75])
+    edges = (np.arange(int(60.0 / turn))[:, np.newaxis] + slots).ravel() * turn
+    pulses = replace(quiet.pulses["cup"], time=quiet.start + np.rint(edges * 1e9).astype(np.int64))
+    recording = replace(quiet, pulses={"cup": pulses})
+    window = process(recording, EstimatorSettings(window=60.0, method="naive")).windows[0]
+    assert abs(window.bias_terms["arithmetic_mean"].value) < 1e-5
 
 
 def test_the_corrected_mean_is_closer_to_the_truth_than_the_raw_one() -> None:

@@ -126,8 +126,8 @@ def predicted_terms(
         rotor: The rotor.
         vane: What tells the direction.
         turbulence: Of the window.
-        arithmetic_mean: Excess of the mean over revolutions over the mean over time [1], exact;
-            K94 (28).
+        arithmetic_mean: Excess of the mean over whole turns over the mean over time [1], exact;
+            K94 (21) to (28).
 
     Returns:
         u (overspeeding), v (speed against vector mean), w (angular response), vane_lag (what the

@@ -18,6 +18,9 @@ from wind_sensors.station.model import Cup, Station
 _TOGETHER = 20
 """So many blocks are summed at once."""
 
+_TURN = 2.0 * np.pi - 1e-6
+"""A whole turn, of angles that are sums of slots [rad]."""
+
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
@@ -33,9 +36,9 @@ class RunSums:
         readings: Number of vane readings.
         offsets: Sum over the readings of the speed at which the rotor would stand still [m/s].
         time_directions: Sum over the readings of that speed along the air's direction, shape (2,).
-        rates, intervals, interval_time, interval_turned: Sum of the rotor's rates over the
-            intervals between edges [rad/s], their number, duration [s] and angle [rad]; for the
-            arithmetic mean.
+        rates, turns: Sum of the rotor's rates over the whole turns that end at an edge [rad/s], and
+            their number, for the arithmetic mean. Slots are not equally wide, turns are.
+        interval_time, interval_turned: Duration [s] and angle [rad] of all intervals between edges.
         carried: Sum of the mount's velocity over the readings [m/s], shape (2,).
     """
 
@@ -46,7 +49,7 @@ class RunSums:
     offsets: float = 0.0
     time_directions: FloatArray = field(default_factory=lambda: np.zeros(2))
     rates: float = 0.0
-    intervals: int = 0
+    turns: int = 0
     interval_time: float = 0.0
     interval_turned: float = 0.0
     carried: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -105,6 +108,8 @@ class RunCounter:
         self._source = CircumstanceSource(self._timeline.stations[0], use_air)
         self._last_time = 0
         self._last_angle = 0.0
+        self._turn_times: TimeArray = np.empty(0, dtype=np.int64)
+        self._turn_angles: FloatArray = np.empty(0)
         self._windows = Windows(start, length)
         self._pending: list[Block] = []
 
@@ -165,14 +170,34 @@ class RunCounter:
         turned = np.diff(angle, prepend=self._last_angle)
         dt = np.diff(times, prepend=self._last_time) * 1e-9
         self._last_time, self._last_angle = int(times[-1]), float(angle[-1])
-        turned = turned / self._calibration(times)[0]
+        gain = self._calibration(times)[0]
+        rates = self._rates_of_turns(times, angle) / gain
+        turned = turned / gain
         unit, _ = self._directions(times, np.interp(times, h.nose.time, h.nose.angle))
         for sums, part in self._windows.at(times):
             sums.edges += int(np.count_nonzero(part))
             sums.turned += float(turned[part].sum())
             sums.directions += (unit[part] * turned[part, np.newaxis]).sum(axis=0)
             moving = part & (dt > 0.0) & (turned > 0.0)
-            sums.rates += float((turned[moving] / dt[moving]).sum())
-            sums.intervals += int(np.count_nonzero(moving))
+            whole = moving & (rates > 0.0)
+            sums.rates += float(rates[whole].sum())
+            sums.turns += int(np.count_nonzero(whole))
             sums.interval_time += float(dt[moving].sum())
             sums.interval_turned += float(turned[moving].sum())
+
+    def _rates_of_turns(self, times: TimeArray, angle: FloatArray) -> FloatArray:
+        """Mean rate over the turn that ends at each edge [rad/s], zero until there was one.
+
+        A counter that is read less often than once a turn gives it over its own interval.
+        """
+        time = np.concatenate((self._turn_times, times))
+        turned = np.concatenate((self._turn_angles, angle))
+        own = np.arange(time.size - times.size, time.size)
+        first = np.searchsorted(turned, turned[own] - _TURN, side="right") - 1
+        begun = first >= 0
+        first = np.maximum(first, 0)
+        span = (time[own] - time[first]) * 1e-9
+        kept = int(max(first[-1] - 1, 0))
+        self._turn_times, self._turn_angles = time[kept:], turned[kept:]
+        known = begun & (span > 0.0)
+        return np.where(known, (turned[own] - turned[first]) / np.where(known, span, 1.0), 0.0)

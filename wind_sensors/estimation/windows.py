@@ -205,10 +205,10 @@ class WindowAccumulator:
             SmallScales(s.along / blocks, s.across / blocks),
         )  # fmt: skip
         arithmetic = 0.0
-        if run.intervals and run.interval_turned > 0.0:
+        if run.turns and run.interval_turned > 0.0:
             mean_rate = run.interval_turned / run.interval_time
             offset = run.offsets / max(run.readings, 1) / length
-            arithmetic = (run.rates / run.intervals + offset) / (mean_rate + offset) - 1.0
+            arithmetic = (run.rates / run.turns + offset) / (mean_rate + offset) - 1.0
         if vane is None:
             seen, loss = 1.0 - float(np.sum(np.square(s.pointing / s.count))), 0.0
             terms = array_terms(state, float(np.hypot(wind_run[0], wind_run[1])))
