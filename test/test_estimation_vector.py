@@ -156,7 +156,7 @@ def test_the_inverse_method_takes_each_propellers_own_constants() -> None:
 
 
 def test_the_wind_run_of_an_array_is_counted_with_its_gains_and_offsets() -> None:
-    known = (
+    known: tuple[dict[str, float], ...] = (
         {"calibration_offset": 0.5, "calibration_gain": 1.2}, {"calibration_offset": -0.3}, {},
     )
     axes = tripod_axes(DIRECTION)

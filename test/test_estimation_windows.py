@@ -9,11 +9,13 @@ import pytest
 from estimation_cases import blown, mast, truth_at
 
 from wind_sensors.estimation import EstimatorSettings, Method, process
+from wind_sensors.estimation.core import SmallScales
 from wind_sensors.estimation.inverse_kernel import (
     forcing_from_motion,
     local_parabola,
     wind_heading_from_motion,
 )
+from wind_sensors.estimation.unresolved import excess_speed
 from wind_sensors.instruments.cup_vane import vector_wind_run
 from wind_sensors.instruments.dynamics.rotor import rotor_acceleration, rotor_forcing
 from wind_sensors.instruments.dynamics.vane import vane_acceleration
@@ -88,7 +90,11 @@ def test_what_the_vertical_wind_may_be_is_no_uncertainty_of_the_horizontal_mean(
     averaged = found.covariance[used].mean(axis=0) / 60.0
     assert averaged[2, 2] > 4.0 * averaged[0, 0]
     # Beside the estimates' own errors: 0.2 % of calibration and a quarter of the correction.
-    correction = max(np.hypot(*window.bias[:2]), abs(window.raw_scalar_mean - window.scalar_mean))
+    told_terms = (abs(window.bias_terms[k].value) for k in ("u", "w", "vane_lag", "translation"))
+    correction = max(
+        np.hypot(*window.bias[:2]), abs(window.raw_scalar_mean - window.scalar_mean),
+        window.scalar_mean * sum(told_terms),
+    )
     common = (0.002 * window.scalar_mean) ** 2 + (0.25 * correction) ** 2
     told = window.vector_mean_covariance[:2, :2]
     assert told == pytest.approx(averaged[:2, :2] + common * np.eye(2), rel=1e-6, abs=1e-9)
@@ -110,6 +116,45 @@ def test_an_oblique_response_is_uncertain_by_the_vertical_variance_that_nobody_m
     across = np.array([-along[1], along[0]])
     assert across @ window.bias_covariance[:2, :2] @ across < told
     assert along @ window.bias_covariance[:2, :2] @ along > told
+
+
+@pytest.mark.parametrize("bandwidth", [0.5, 1.0])
+def test_the_inverse_method_takes_off_what_smoothed_gusts_add_to_the_speed(
+    bandwidth: float,
+) -> None:
+    cup = {"mu2": 0.0, "distance_constant": 3.0}
+    recording = blown(mast(cup), duration=150.0, intensity=0.2, sample_rate=50.0)
+    found = process(
+        recording, EstimatorSettings(method="inverse", window=150.0, bandwidth=bandwidth)
+    )
+    (window,) = found.windows
+    inside = (found.time >= window.start) & (found.time < window.stop)
+    truth = truth_at(recording, found.time)[inside].mean(axis=0)[:2]
+    along = truth / np.hypot(*truth)
+    overspeeding = window.bias_terms["u"].value * window.scalar_mean
+    assert overspeeding > 0.03
+    assert abs(along @ (window.vector_mean[:2] - truth)) < 0.4 * overspeeding
+    assert along @ window.bias[:2] > 0.5 * overspeeding
+    assert np.sqrt(along @ window.bias_covariance[:2, :2] @ along) > 0.2 * overspeeding
+
+
+@pytest.mark.parametrize("length", [0.3, 1.7, 20.0])
+def test_the_excess_of_smoothed_gusts_is_that_of_a_sum_of_gusts(length: float) -> None:
+    """Every gust of a spectrum by itself: smoothed by a Gaussian, followed by the rotor."""
+    cup = mast({"mu2": 0.7, "a4": 0.8, "distance_constant": length}).instruments[0]
+    assert isinstance(cup, Cup)
+    speed, bandwidth, height = 6.0, 1.5, 0.2
+    frequency = np.linspace(0.001, 400.0, 2_000_001)
+    # D(t) = 2 int (1 - cos 2 pi f t) S df is 1 t^(2/3) for this one-sided S.
+    spectrum = frequency ** (-5.0 / 3.0) / 13.68
+    kept = np.exp2(-np.square(frequency / bandwidth))
+    lag = np.square(2.0 * np.pi * frequency * length / speed)
+    step = frequency[1] - frequency[0]
+    along = np.sum(spectrum * (1.0 - kept) * lag / (1.0 + lag)) * step
+    across = 4.0 / 3.0 * np.sum(spectrum * (1.0 - kept)) * step
+    expected = (0.8 * along + 0.5 * across + 0.5 * 0.7 * height) / speed
+    found = excess_speed(cup, SmallScales(1.0, 4.0 / 3.0), bandwidth, height, np.array([speed]))
+    assert found[0] == pytest.approx(expected, rel=0.02)
 
 
 def test_an_error_of_a_wake_does_not_average_out() -> None:

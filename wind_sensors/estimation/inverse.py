@@ -2,7 +2,8 @@
 
 The turned angle of the rotor and the heading of the vane are fitted locally by parabolas with
 Gaussian weights, which gives value, rate and acceleration in a stated bandwidth; the equations of
-motion (`instruments.dynamics`) then give the wind that makes them. Sources: Jackson (c. 1980),
+motion (`instruments.dynamics`) then give the wind that makes them, and what gusts above the
+bandwidth add to it is taken off (`unresolved`). Sources: Jackson (c. 1980),
 (10), for the rotor; Mitsuta (1966), (5), for the vane, with sin for large deviations.
 """
 
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.circumstances import CircumstanceSource
-from wind_sensors.estimation.constants import instruments_of
+from wind_sensors.estimation.constants import instruments_of, measures_vertical, rotors_of
 from wind_sensors.estimation.core import (
     Estimates,
     SmallScales,
@@ -31,6 +32,8 @@ from wind_sensors.estimation.scale_follower import ScaleFollower
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.site import with_site_covariance
 from wind_sensors.estimation.timeline import Timeline
+from wind_sensors.estimation.turbulence_process import neutral_vertical_variance
+from wind_sensors.estimation.unresolved import excess_speed
 from wind_sensors.station.model import Downwash, Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -100,6 +103,7 @@ class InverseCore:
         silent = max((o.stop - o.start for i in station.instruments for o in i.outages), default=0)
         self._history = History(station, origin, 4.0 * _REACH * self._width + 4.0 + silent)
         self._instruments = [instruments_of(s) for s in self._timeline.stations]
+        self._vertical_is_measured = measures_vertical(station)
         self._source = CircumstanceSource(self._timeline.stations[0], settings.use_air)
         self._next = 0
         self._stop = 0
@@ -174,8 +178,23 @@ class InverseCore:
             across[k] = seen + _STRUCTURE_ACROSS * (level * missing + aside)
             upwards[k] = 3.0 * level if lift is None else across[k]
         speed = np.hypot(wind[:, 0], wind[:, 1])
+        speed = speed - self._excess(number, speed)
         heading = np.arctan2(-wind[:, 1], -wind[:, 0])
         return earth_estimates(times, speed, heading, along, across, upwards, rows, wind[:, 2])
+
+    def _excess(self, number: int, speed: FloatArray) -> FloatArray:
+        """What gusts that the fits smooth away have added to the speed [m/s], shape (n,)."""
+        scales = self._scales.small_scales()
+        if scales is None or not speed.size:
+            return np.zeros_like(speed)
+        station = self._timeline.stations[number]
+        vertical = 0.0
+        if not self._vertical_is_measured:
+            height = station.recording.measuring_height
+            vertical = scales.across * neutral_vertical_variance(height, float(speed.mean()))
+        return excess_speed(
+            rotors_of(station)[0], scales, self._settings.bandwidth, vertical, speed
+        )
 
     def small_scales(self) -> SmallScales | None:
         """From the structure function."""

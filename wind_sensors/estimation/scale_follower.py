@@ -7,11 +7,12 @@ import numpy.typing as npt
 
 from wind_sensors.estimation.core import SmallScales
 from wind_sensors.estimation.settings import EstimatorSettings
+from wind_sensors.estimation.unresolved import VARIANCE_ABOVE
 
 FloatArray = npt.NDArray[np.float64]
 
-_VARIANCE_ABOVE = 0.1096
-"""Variance above f of an inertial range with D(t) = level t^(2/3) is this level f^(-2/3)."""
+_ALONG, _ACROSS = 6.0 / 7.0, 8.0 / 7.0
+"""Levels along and across the wind relative to their mean: the second is 4/3 of the first."""
 
 
 class ScaleFollower:
@@ -29,7 +30,7 @@ class ScaleFollower:
     @property
     def unresolved(self) -> float:
         """Variance of a component above the bandwidth, for level 1."""
-        return float(_VARIANCE_ABOVE * self._settings.bandwidth ** (-2.0 / 3.0))
+        return float(VARIANCE_ABOVE * self._settings.bandwidth ** (-2.0 / 3.0))
 
     def follow(self, velocity: FloatArray) -> None:
         """Take new estimates [m/s], shape (n, 3)."""
@@ -45,16 +46,16 @@ class ScaleFollower:
         self._recent = [joined[-lag:]]
 
     def level(self) -> float:
-        """D(t) = level t^(2/3), the loss above the bandwidth allowed for."""
+        """D(t) = level t^(2/3), mean of both components, with what is lost above the bandwidth."""
         if self._structure[1] <= 0.0:
             return 0.5
         seen = self._structure[0] / self._structure[1]
         lag = 1.0 / self._settings.bandwidth
-        return float(seen / (lag ** (2.0 / 3.0) * (1.0 - 2.0 * _VARIANCE_ABOVE)))
+        return float(seen / (lag ** (2.0 / 3.0) * (1.0 - 2.0 * VARIANCE_ABOVE)))
 
     def small_scales(self) -> SmallScales | None:
-        """The level of both components; None before there were estimates."""
+        """Levels of an inertial range with that mean; None before there were estimates."""
         if self._structure[1] <= 0.0:
             return None
         level = self.level()
-        return SmallScales(level, level)
+        return SmallScales(_ALONG * level, _ACROSS * level)

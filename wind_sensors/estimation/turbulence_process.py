@@ -56,10 +56,20 @@ _VON_KARMAN = 0.4
 
 
 @compiled
+def neutral_vertical_variance(height: float, speed: float) -> float:
+    """<w^2> of a neutral surface layer whose cross-wind level is 1 [m^2/s^2].
+
+    Args:
+        height: Above the ground [m].
+        speed: Mean wind there [m/s].
+    """
+    return float(_NEUTRAL_VERTICAL * (_VON_KARMAN * height / max(speed, 1.0)) ** (2.0 / 3.0))
+
+
+@compiled
 def slow_vertical_variance(height: float, speed: float) -> float:
     """Variance of the slowest vertical process for level 1, at a height [m] and speed [m/s]."""
-    time = _VON_KARMAN * height / max(speed, 1.0)
-    total = _NEUTRAL_VERTICAL * time ** (2.0 / 3.0)
+    total = neutral_vertical_variance(height, speed)
     return float(min(max(total - _FAST_VERTICAL, 0.0), VERTICAL_VARIANCES[-1]))
 
 

@@ -219,7 +219,14 @@ class WindowAccumulator:
                 seen = 1.0 - float(np.sum(np.square(run.directions))) / run.turned**2
             loss = vane_loss(vane, state) / max(speed, 0.1) ** 2
             terms = predicted_terms(rotor, vane, state, arithmetic)
-        covariance, bias_covariance = self._uncertainty(s, speed, raw_speed, bias, duration)
+        removed = speed * sum(
+            abs(terms[name].value) for name in ("u", "w", "vane_lag", "translation")
+        )
+        change = max(
+            float(np.hypot(bias[0], bias[1])), removed,
+            abs(raw_speed - speed) if self._station.platform is None else 0.0,
+        )
+        covariance, bias_covariance = self._uncertainty(s, speed, change, duration)
         vertical = (terms["w"].uncertainty * speed) ** 2 * np.outer(turn[0], turn[0])
         covariance, bias_covariance = covariance + vertical, bias_covariance + vertical
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
@@ -268,17 +275,22 @@ class WindowAccumulator:
         return vector + run.carried / readings, told
 
     def _uncertainty(
-        self, s: _Sums, speed: float, raw_speed: float, bias: FloatArray, duration: float
+        self, s: _Sums, speed: float, change: float, duration: float
     ) -> tuple[FloatArray, FloatArray]:
         """Covariances of the corrected vector mean and of the correction [m^2/s^2].
 
         The instruments' own errors average out over the window, those of the mount's attitude and
         velocity, of the calibration and of the correction do not.
+
+        Args:
+            s: Sums of the window.
+            speed: Scalar mean [m/s].
+            change: Size of the correction, made or called for by the turbulence [m/s].
+            duration: [s].
         """
         total = s.covariance / s.count
         averaged = s.own / s.count * min(_CORRELATION_TIME / duration, 1.0)
-        local = abs(raw_speed - speed) if self._station.platform is None else 0.0
-        correction = _CORRECTION_UNCERTAINTY * max(float(np.hypot(bias[0], bias[1])), local)
+        correction = _CORRECTION_UNCERTAINTY * change
         bias_covariance = np.diag([correction**2, correction**2, 0.0])
         mean_covariance = averaged + s.mount / s.count
         mean_covariance += np.eye(3) * ((_CALIBRATION_UNCERTAINTY * speed) ** 2 + correction**2)
