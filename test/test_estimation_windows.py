@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from estimation_cases import blown, mast, truth_at
+from scipy.stats import norm
 
 from wind_sensors.estimation import EstimatorSettings, Method, process
 from wind_sensors.estimation.core import SmallScales
@@ -189,6 +190,23 @@ def test_direction_variance_is_corrected_towards_the_truth() -> None:
     value, _, uncertainty = told.removesuffix(" rad^2").split()
     assert float(value) == pytest.approx(window.corrected_direction_variance, rel=0.01)
     assert float(uncertainty) == pytest.approx(window.direction_variance_uncertainty, rel=0.1)
+
+
+def test_a_wide_spread_of_directions_is_not_told_too_small() -> None:
+    """1 - R^2 of a normal distribution is 1 - exp(-sigma^2): 15 % too small at 33 degrees."""
+    quiet = blown(mast(), duration=120.0, intensity=0.0)
+    vane, cup = quiet.angles["vane"], quiet.pulses["cup"]
+    wanted = ((np.arange(vane.angle.size) + 0.5) * 0.6180339887) % 1.0
+    heading = 0.4 + np.pi + 0.57 * norm.ppf(wanted)
+    edges = quiet.start + np.arange(0, 120_000_000_000, 27_000_000, dtype=np.int64)
+    recording = replace(
+        quiet, angles={"vane": replace(vane, angle=heading)},
+        pulses={"cup": replace(cup, time=edges)},
+    )
+    (window,) = process(recording, EstimatorSettings(window=120.0, method="naive")).windows
+    at_edges = np.interp(edges, vane.time, heading)
+    assert window.direction_variance == pytest.approx(1.0 - np.exp(-at_edges.var()), rel=0.03)
+    assert window.corrected_direction_variance == pytest.approx(at_edges.var(), rel=0.03)
 
 
 RUBBING_CUP = mast({"a4": 0.8, "friction_speed": 0.4, "mu2": 0.0}).instruments[0]

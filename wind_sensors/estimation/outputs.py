@@ -68,8 +68,9 @@ class WindowStatistics:
         scalar_mean, scalar_mean_uncertainty: Corrected mean speed.
         direction, direction_uncertainty: Of the corrected vector mean.
         direction_variance: 1 - R^2 of the vane's readings [rad^2], Kristensen (1994), (85).
-        corrected_direction_variance, direction_variance_uncertainty: Corrected for the vane's
-            response [rad^2].
+        corrected_direction_variance, direction_variance_uncertainty: -ln R^2, which a spread of
+            any size of a normal distribution leaves true, corrected for the vane's response
+            [rad^2]. Like R it is weighted by wind run, not by time.
         turbulence: Standard deviations along, across and up [m/s], shape (3,).
         bias_terms: `u`, `v`, `w`, `vane_lag`, `translation`, `arithmetic_mean`: relative biases
             of the raw reading.

@@ -23,6 +23,7 @@ from wind_sensors.estimation.presence import Presence
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.site import has_wakes, site_covariance
 from wind_sensors.estimation.wind_run import RunCounter, RunSums
+from wind_sensors.instruments.cup_vane import direction_variance_logarithmic
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -31,6 +32,8 @@ _CORRECTION_UNCERTAINTY = 0.25
 """Relative standard uncertainty of the correction as a whole: a4, angular response, levels."""
 _CALIBRATION_UNCERTAINTY = 0.002
 """Relative, of a calibration laboratory."""
+_WIDEST = math.pi**2 / 3.0
+"""Variance of a direction of which nothing is known [rad^2]."""
 _CORRELATION_TIME = 1.0
 """Errors of estimates further apart are independent [s]."""
 _LEAST_MEASURED = 0.5
@@ -229,6 +232,9 @@ class WindowAccumulator:
         covariance, bias_covariance = self._uncertainty(s, speed, change, duration)
         vertical = (terms["w"].uncertainty * speed) ** 2 * np.outer(turn[0], turn[0])
         covariance, bias_covariance = covariance + vertical, bias_covariance + vertical
+        spread = _WIDEST
+        if seen < 1.0:
+            spread = min(direction_variance_logarithmic(seen), _WIDEST)
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
         across_variance = float(across_direction @ covariance @ across_direction)
         # Rounding may leave less than nothing; `max` keeps a nan that comes first.
@@ -249,9 +255,9 @@ class WindowAccumulator:
             direction=direction,
             direction_uncertainty=math.sqrt(across_variance) / max(vector_speed, 0.1),
             direction_variance=seen,
-            corrected_direction_variance=max(seen + loss, 0.0),
+            corrected_direction_variance=max(spread + loss, 0.0),
             direction_variance_uncertainty=math.hypot(
-                _CORRECTION_UNCERTAINTY * loss, seen * math.sqrt(2.0 / independent)
+                _CORRECTION_UNCERTAINTY * loss, spread * math.sqrt(2.0 / independent)
             ),
             turbulence=turbulence,
             bias_terms=terms,
