@@ -90,3 +90,10 @@ def test_wider_differences_reach_closer_to_the_nyquist_frequency() -> None:
     plain = np.max(np.abs(bivane.overall_gain(frequency, sampling, ZETA) - 1.0))
     assert worst < 0.05
     assert plain > 0.3
+
+
+@pytest.mark.parametrize("count", [0, 3, 4])
+def test_a_record_shorter_than_its_differences_gives_nothing(count: int) -> None:
+    reduced = bivane.reduce_samples(np.zeros(count), SPEED, 0.1, RUN, ZETA, half_width=2)
+    assert reduced.shape == (count,)
+    assert np.isnan(reduced).all()

@@ -421,3 +421,21 @@ def test_the_wind_along_the_platforms_axes_is_the_felt_wind_and_the_motion(
     )
     np.testing.assert_allclose(along, rotation @ felt[0] + (4.0, -1.0, 0.3), atol=1e-9)
     assert along @ covariance @ along == pytest.approx(wind @ spread @ wind, rel=1e-6, abs=1e-6)
+
+
+def test_angles_at_the_seam_stay_within_their_turn() -> None:
+    above, below = np.nextafter(np.pi, 9.0), np.nextafter(-np.pi, -9.0)
+    wrapped = frames.wrap([np.nextafter(np.pi, 0.0), np.pi, above, -np.pi, below])
+    assert np.all((wrapped >= -np.pi) & (wrapped < np.pi))
+    assert np.abs(np.exp(1j * wrapped) + 1.0).max() < 1e-15
+    assert float(frames.direction_from_deg((1e-17, -1.0))) == 0.0
+    assert float(frames.compass_from_yaw(np.nextafter(0.5 * np.pi, 9.0))) < 360.0
+
+
+def test_variances_of_three_instants_are_told_apart_from_those_of_three_axes() -> None:
+    still = Motion(np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)), *[np.zeros((3, 3))] * 3)
+    found = relative_wind.earth_wind_covariance(
+        np.tile([10.0, 0.0, 0.0], (3, 1)), np.zeros((3, 3)), still, (0.0, 0.0, 0.0), np.eye(3),
+        attitude_variance=0.0, velocity_variance=[1.0, 2.0, 3.0],
+    )
+    assert found == pytest.approx(np.arange(1.0, 4.0)[:, None, None] * np.eye(3))

@@ -104,3 +104,14 @@ def test_what_cannot_be_solved_is_reported() -> None:
     )
     residual_free = bool(estimate.converged[0]) and not bool(np.any(estimate.noisy))
     assert not residual_free
+
+
+def test_a_row_without_a_reading_does_not_spoil_the_others() -> None:
+    axes = propeller_array.orthogonal_axes()
+    wind = np.array([[4.0, 1.5, 2.0], [5.0, 1.0, 1.0], [3.0, 2.0, -1.0]])
+    readings = propeller_array.steady_readings(axes, ROTOR, wind)
+    readings[1, 0] = np.nan
+    estimate = propeller_array.solve(axes, ROTOR, readings)
+    assert estimate.converged.tolist() == [True, False, True]
+    assert np.isnan(estimate.velocity[1]).all()
+    assert estimate.velocity[[0, 2]] == pytest.approx(wind[[0, 2]], abs=1e-6)

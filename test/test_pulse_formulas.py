@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wind_sensors.instruments import pulses
+from wind_sensors.instruments import cup_vane, pulses
 
 
 @given(st.lists(st.floats(0.01, 10.0), min_size=2, max_size=60))
@@ -71,3 +71,8 @@ def test_short_records() -> None:
     assert pulses.revolutions([0.0, 1.0], 3).durations.size == 0
     with pytest.raises(ValueError, match="two whole turns"):
         pulses.slot_fractions([0.0, 1.0, 2.0], 2)
+
+
+def test_nothing_counted_is_no_number() -> None:
+    assert all(math.isnan(value) for value in pulses.mean_speed([], 0.2))
+    assert math.isnan(cup_vane.direction_variance([]))

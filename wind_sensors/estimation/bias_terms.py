@@ -134,11 +134,12 @@ def predicted_terms(
         vane does not follow), translation (the propeller moves with the vane), arithmetic_mean.
     """
     speed = max(turbulence.speed, 0.1)
+    p = rotor_parameters(rotor)
     mu2 = response_curvature(rotor)
     eps = dissipation(turbulence.small_scales.along, speed)
     local = inertial_bias(
         rotor.distance_constant * rotor.inertia_factor, eps, speed, 0.0,
-        turbulence.vertical_variance, rotor_parameters(rotor).a4, 0.0, mu2,
+        turbulence.vertical_variance, p.a4, p.mu1, mu2,
     )
     vertical = _MEASURED_VERTICAL if turbulence.vertical_is_measured else _INFERRED_VERTICAL
     across = dissipation(0.75 * turbulence.small_scales.across, speed)

@@ -46,7 +46,7 @@ def earth_estimates(
         speed: Across the vane's axis [m/s], shape (n,).
         heading: Where the wind comes from, counter-clockwise from x [rad], shape (n,).
         along_variance, across_variance, vertical_variance: [m^2/s^2], shape (n,).
-        rows: Circumstances, shape (n, 22).
+        rows: Circumstances, shape (n, 23).
         vertical: Along the vane's axis [m/s], shape (n,); None: not known, taken as zero.
     """
     c, s = -np.cos(heading), -np.sin(heading)

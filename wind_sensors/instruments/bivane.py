@@ -107,6 +107,8 @@ def reduce_samples(
     if printed_form:
         curvature = free_wind_run / (4.0 * math.pi**2)
     out = np.full(beta.shape, np.nan)
+    if beta.size <= 2 * half_width:
+        return out
     inner = slice(half_width, beta.size - half_width)
     middle = beta[inner]
     slope = np.zeros_like(middle)

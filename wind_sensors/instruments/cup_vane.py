@@ -71,17 +71,22 @@ def direction_from(heading: npt.ArrayLike) -> FloatArray:
     Args:
         heading: Where the air goes, counter-clockwise from east [rad].
     """
-    return np.mod(270.0 - np.degrees(np.asarray(heading, dtype=np.float64)), 360.0)
+    degrees = np.mod(270.0 - np.degrees(np.asarray(heading, dtype=np.float64)), 360.0)
+    # The remainder of a tiny negative angle rounds to a whole turn.
+    return np.mod(degrees, 360.0)
 
 
 def heading_of(direction: npt.ArrayLike) -> FloatArray:
     """Heading of the air [rad, 0..2 pi) from D [degrees clockwise from north]; K94 (34)."""
-    return np.radians(np.mod(270.0 - np.asarray(direction, dtype=np.float64), 360.0))
+    degrees = np.mod(270.0 - np.asarray(direction, dtype=np.float64), 360.0)
+    return np.radians(np.mod(degrees, 360.0))
 
 
 def direction_variance(headings: npt.ArrayLike) -> float:
-    """1 - <cos>^2 - <sin>^2 [rad^2], weighted by wind run; K94 (85)."""
+    """1 - <cos>^2 - <sin>^2 [rad^2], weighted by wind run; NaN without headings; K94 (85)."""
     phi = np.asarray(headings, dtype=np.float64)
+    if phi.size == 0:
+        return math.nan
     deviation = phi - math.atan2(float(np.sum(np.sin(phi))), float(np.sum(np.cos(phi))))
     # 1 - R^2 without cancellation: R = 1 - 2 <sin^2(d/2)>.
     deficit = 2.0 * float(np.mean(np.sin(0.5 * deviation) ** 2))

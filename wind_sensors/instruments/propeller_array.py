@@ -189,7 +189,7 @@ def solve(
     Args:
         axes: Unit vectors, shape (m, 3), m >= 3, spanning space.
         propellers: Constants, the same for all axes, or one equation for each axis.
-        indicated: P omega [m/s], shape (n, m).
+        indicated: P omega [m/s], shape (n, m); a row with a NaN gives NaN, not converged.
         indicated_rate: P domega/dt [m/s^2], shape (n, m); zero (steady) if not given. Take it
             before decimating.
 
@@ -212,8 +212,10 @@ def solve(
     velocity = y @ inverse.T
     iterations = np.zeros(y.shape[0], dtype=np.int64)
     converged = np.all(y == 0.0, axis=1)
+    unread = ~(np.isfinite(y).all(axis=1) & np.isfinite(rate).all(axis=1))
+    velocity[unread] = np.nan
     for step in range(_FIXED_POINT_STEPS):
-        active = np.flatnonzero(~converged)
+        active = np.flatnonzero(~converged & ~unread)
         if active.size == 0:
             break
         updated = _roots(unit, equations, y[active], rate[active], velocity[active]).value
@@ -222,7 +224,7 @@ def solve(
         velocity[active] = updated
         iterations[active] = step + 1
         converged[active] = settled
-    left = np.flatnonzero(~converged)
+    left = np.flatnonzero(~converged & ~unread)
     if left.size:
         velocity[left], settled = _newton(unit, equations, y[left], rate[left], velocity[left])
         iterations[left] += _NEWTON_STEPS

@@ -83,8 +83,13 @@ def mean_speed(
         calibration_distance: l [m/rad].
         pulses_per_revolution: n; intervals are of 1/n turn.
         starting_speed: U0 [m/s], added to both means.
+
+    Returns:
+        The means and the variance; NaN without intervals.
     """
     dt = np.asarray(intervals, dtype=np.float64)
+    if dt.size == 0:
+        return MeanSpeed(math.nan, math.nan, math.nan)
     speeds = speeds_of_intervals(dt, calibration_distance, 1.0 / pulses_per_revolution)
     total = float(np.sum(dt))
     count = 2.0 * math.pi * calibration_distance * dt.size / (pulses_per_revolution * total)

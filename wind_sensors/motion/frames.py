@@ -46,8 +46,16 @@ def attitude_ned_from_enu(attitude: npt.ArrayLike) -> FloatArray:
 def wrap(angle: npt.ArrayLike) -> FloatArray:
     """Angle in [-pi, pi) [rad]."""
     a = np.asarray(angle, dtype=np.float64)
-    wrapped: FloatArray = a - 2.0 * np.pi * np.floor((a + np.pi) / (2.0 * np.pi))
-    return wrapped
+    wrapped = a - 2.0 * np.pi * np.floor((a + np.pi) / (2.0 * np.pi))
+    # Rounding may leave an angle at the seam on its far side.
+    within: FloatArray = np.where((wrapped < -np.pi) | (wrapped >= np.pi), -np.pi, wrapped)[()]
+    return within
+
+
+def within_turn(degrees: npt.ArrayLike) -> FloatArray:
+    """Angle in [0, 360) [deg]: of a tiny negative one the first remainder rounds to 360."""
+    turned: FloatArray = np.mod(np.mod(np.asarray(degrees, dtype=np.float64), 360.0), 360.0)
+    return turned
 
 
 def direction_from_deg(velocity: npt.ArrayLike) -> FloatArray:
@@ -59,8 +67,7 @@ def direction_from_deg(velocity: npt.ArrayLike) -> FloatArray:
     Source: Kristensen (1994), (34), modulo 360.
     """
     v = np.asarray(velocity, dtype=np.float64)
-    degrees: FloatArray = np.degrees(np.arctan2(-v[..., 0], -v[..., 1])) % 360.0
-    return degrees
+    return within_turn(np.degrees(np.arctan2(-v[..., 0], -v[..., 1])))
 
 
 def velocity_from_direction(speed: npt.ArrayLike, direction_from_deg: npt.ArrayLike) -> FloatArray:
@@ -85,8 +92,7 @@ def yaw_from_compass(heading_deg: npt.ArrayLike, declination_deg: float = 0.0) -
 def compass_from_yaw(yaw: npt.ArrayLike, declination_deg: float = 0.0) -> FloatArray:
     """Compass heading clockwise from north [deg, 0 to 360) from a yaw [rad]; see above."""
     yaw_deg = np.degrees(np.asarray(yaw, dtype=np.float64))
-    degrees: FloatArray = (90.0 - yaw_deg - declination_deg) % 360.0
-    return degrees
+    return within_turn(90.0 - yaw_deg - declination_deg)
 
 
 def heading_of(attitude: npt.ArrayLike) -> FloatArray:

@@ -144,8 +144,7 @@ def earth_wind_covariance(
 
     def diagonal(variance: npt.ArrayLike) -> FloatArray:
         v = np.asarray(variance, dtype=np.float64)
-        v = v[:, np.newaxis] if v.ndim == 1 and v.shape[0] == count and count != 3 else v
-        return np.broadcast_to(v, (count, 3))
+        return np.broadcast_to(v[:, np.newaxis] if v.ndim == 1 else v, (count, 3))
 
     def spread(jacobian: FloatArray, variance: npt.ArrayLike) -> FloatArray:
         every = np.broadcast_to(jacobian, (count, 3, 3))
