@@ -286,6 +286,30 @@ def test_the_pull_of_a_cable_that_is_known_is_undone(method: Method) -> None:
     assert turned[2] < 0.5
 
 
+@pytest.mark.parametrize("method", ["kalman", "inverse"])
+def test_without_the_air_each_instrument_stands_in_that_of_its_own_calibration(
+    method: Method,
+) -> None:
+    recording = blown(mast(vane={"damping_ratio": 1.2}), duration=20.0)
+    settings = EstimatorSettings(method=method, window=20.0, use_air=False)
+    thin = mast({"reference_density": 1.0}, {"reference_density": 1.3, "damping_ratio": 1.2})
+    found = process(replace(recording, station=thin), settings)
+    expected = process(recording, settings)
+    assert np.array_equal(found.velocity, expected.velocity)
+
+
+def test_without_a_thermometer_friction_is_that_of_the_calibration() -> None:
+    cold = {
+        "friction_speed": 1.0, "friction_temperature_coefficient": -0.05,
+        "reference_temperature": -10.0,
+    }
+    recording = blown(mast(cold), speed=5.0, duration=60.0, temperature=-10.0)
+    assert recording.temperature is None
+    found = process(recording, EstimatorSettings(method="inverse", window=60.0, bandwidth=2.0))
+    error = (found.velocity - truth_at(recording, found.time))[200:-100, :2].mean(axis=0)
+    assert np.hypot(*error) < 0.05
+
+
 def test_the_local_parabola_is_exact_for_a_parabola() -> None:
     time = np.sort(np.random.default_rng(1).integers(0, 2_000_000_000, 80))
     x = (time - 900_000_000).astype(np.float64) * 1e-9

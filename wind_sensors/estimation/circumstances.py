@@ -10,7 +10,14 @@ from wind_sensors.estimation.intake import Block
 from wind_sensors.motion import Motion, PlatformTrack, TrackLimits, rotations, true_motion
 from wind_sensors.motion.downwash import rotor_downwash
 from wind_sensors.motion.relative_wind import sensor_rotation, sensor_velocity
-from wind_sensors.station.model import STANDARD_DENSITY, Clock, Downwash, Platform, Station
+from wind_sensors.station.model import (
+    STANDARD_DENSITY,
+    Clock,
+    Downwash,
+    Platform,
+    Rotor,
+    Station,
+)
 from wind_sensors.station.signals import PlatformStates
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,11 +27,16 @@ GAS_CONSTANT_DRY_AIR = 287.05
 """[J kg^-1 K^-1]"""
 STANDARD_PRESSURE = 101_325.0
 """[Pa]"""
-STANDARD_TEMPERATURE = 15.0
-"""[deg C]"""
 STANDARD_GRAVITY = 9.80665
 """[m/s^2]"""
 _KEPT_STATES = 50
+
+
+def as_calibrated(station: Station) -> Station:
+    """The station in air of which every instrument's calibration holds, whatever its density."""
+    return station.model_copy(update={"instruments": tuple(
+        i.model_copy(update={"reference_density": STANDARD_DENSITY}) for i in station.instruments
+    )})
 
 
 class CircumstanceSource:
@@ -32,7 +44,8 @@ class CircumstanceSource:
 
     Args:
         station: The station, without changes.
-        use_air: Use measured temperature and pressure.
+        use_air: Use measured temperature and pressure, else the standard density (`as_calibrated`
+            makes it that of every calibration) and the first rotor's reference temperature.
     """
 
     def __init__(self, station: Station, use_air: bool) -> None:
@@ -42,6 +55,10 @@ class CircumstanceSource:
         self._temperature = np.nan
         self._pressure = np.nan
         self.station = station
+        # Without a thermometer friction is that of the calibration.
+        self._usual_temperature = next(
+            (i.reference_temperature for i in station.instruments if isinstance(i, Rotor)), np.nan
+        )
         heading = float(np.radians(station.sensor_heading_deg))
         turn = rotations.matrix(rotations.from_roll_pitch_yaw(0.0, 0.0, heading))
         self._mast_rotation: FloatArray = turn.ravel()
@@ -66,12 +83,9 @@ class CircumstanceSource:
             self._platform_states = self._platform_states[-_KEPT_STATES - new.time.size :]
 
     def _air(self, rows: FloatArray) -> None:
-        rows[:, forward.AIR_TEMPERATURE] = STANDARD_TEMPERATURE
-        if not self._use_air:
-            rows[:, forward.AIR_DENSITY] = self.station.instruments[0].reference_density
-            return
+        rows[:, forward.AIR_TEMPERATURE] = self._usual_temperature
         rows[:, forward.AIR_DENSITY] = STANDARD_DENSITY
-        if np.isfinite(self._temperature):
+        if self._use_air and np.isfinite(self._temperature):
             rows[:, forward.AIR_TEMPERATURE] = self._temperature
             pressure = self._pressure if np.isfinite(self._pressure) else STANDARD_PRESSURE
             kelvin = self._temperature + 273.15

@@ -14,6 +14,7 @@ from wind_sensors.compiled import is_kept
 from wind_sensors.errors import UserError
 from wind_sensors.estimation.array_methods import InverseArrayCore, NaiveArrayCore
 from wind_sensors.estimation.bivane_sampling import sampling_health
+from wind_sensors.estimation.circumstances import as_calibrated
 from wind_sensors.estimation.constants import axes_of, is_array, rotors_of
 from wind_sensors.estimation.core import Core, Estimates, joined, part_of, trusted
 from wind_sensors.estimation.health import (
@@ -314,15 +315,16 @@ class StreamingEstimator:
     def _new_core(self) -> Core:
         origin = self._intake.origin
         assert origin is not None
+        station = self.station if self.settings.use_air else as_calibrated(self.station)
         if self.settings.method == "kalman":
-            return KalmanCore(self.station, self.settings, self._block, origin)
-        if is_array(self.station):
+            return KalmanCore(station, self.settings, self._block, origin)
+        if is_array(station):
             if self.settings.method == "inverse":
-                return InverseArrayCore(self.station, self.settings, origin)
-            return NaiveArrayCore(self.station, self.settings, origin)
+                return InverseArrayCore(station, self.settings, origin)
+            return NaiveArrayCore(station, self.settings, origin)
         if self.settings.method == "inverse":
-            return InverseCore(self.station, self.settings, origin)
-        return NaiveCore(self.station, self.settings, origin)
+            return InverseCore(station, self.settings, origin)
+        return NaiveCore(station, self.settings, origin)
 
     def _finish(self) -> None:
         self._process(self._intake.blocks(finish=True))
