@@ -176,25 +176,29 @@ class InverseCore:
             along[k] = turned[4] * (length * slot * _EDGE_DEVIATION) ** 2 + level * missing + away
             seen = nose[3] * _READING_DEVIATION**2 * size2
             across[k] = seen + _STRUCTURE_ACROSS * (level * missing + aside)
-            upwards[k] = 3.0 * level if lift is None else across[k]
+            upwards[k] = np.nan if lift is None else across[k]
         speed = np.hypot(wind[:, 0], wind[:, 1])
-        speed = speed - self._excess(number, speed)
+        inferred = self._inferred_vertical_variance(number, speed)
+        upwards[np.isnan(upwards)] = inferred
+        unseen = 0.0 if self._vertical_is_measured else inferred
+        speed = speed - self._excess(number, speed, unseen)
         heading = np.arctan2(-wind[:, 1], -wind[:, 0])
         return earth_estimates(times, speed, heading, along, across, upwards, rows, wind[:, 2])
 
-    def _excess(self, number: int, speed: FloatArray) -> FloatArray:
+    def _inferred_vertical_variance(self, number: int, speed: FloatArray) -> float:
+        """That of a neutral surface layer with the cross-wind's small scales [m^2/s^2]."""
+        height = self._timeline.stations[number].recording.measuring_height
+        mean = float(speed.mean()) if speed.size else 0.0
+        across = _STRUCTURE_ACROSS * self._scales.level()
+        return across * neutral_vertical_variance(height, mean)
+
+    def _excess(self, number: int, speed: FloatArray, vertical: float) -> FloatArray:
         """What gusts that the fits smooth away have added to the speed [m/s], shape (n,)."""
         scales = self._scales.small_scales()
-        if scales is None or not speed.size:
+        if scales is None:
             return np.zeros_like(speed)
-        station = self._timeline.stations[number]
-        vertical = 0.0
-        if not self._vertical_is_measured:
-            height = station.recording.measuring_height
-            vertical = scales.across * neutral_vertical_variance(height, float(speed.mean()))
-        return excess_speed(
-            rotors_of(station)[0], scales, self._settings.bandwidth, vertical, speed
-        )
+        rotor = rotors_of(self._timeline.stations[number])[0]
+        return excess_speed(rotor, scales, self._settings.bandwidth, vertical, speed)
 
     def small_scales(self) -> SmallScales | None:
         """From the structure function."""

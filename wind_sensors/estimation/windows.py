@@ -251,7 +251,7 @@ class WindowAccumulator:
             bias_covariance=bias_covariance,
             raw_scalar_mean=raw_speed,
             scalar_mean=speed,
-            scalar_mean_uncertainty=float(np.sqrt(np.trace(covariance[:2, :2]) / 2.0)),
+            scalar_mean_uncertainty=math.sqrt(float(turn[0] @ covariance @ turn[0])),
             direction=direction,
             direction_uncertainty=math.sqrt(across_variance) / max(vector_speed, 0.1),
             direction_variance=seen,
