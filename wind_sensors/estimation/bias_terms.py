@@ -19,6 +19,9 @@ from wind_sensors.turbulence.inertial_range import (
     one_sided_longitudinal_constant,
 )
 
+_OVERSPEEDING_UNCERTAINTY = 0.5
+"""Relative, of `u`: the level that a filter finds at the scales of a rotor is too low, by up to a
+half where pulses are few."""
 _LEVEL_UNCERTAINTY = 0.2
 """Relative, of an inertial-range level and of a4 together."""
 _INFERRED_VERTICAL = 1.5
@@ -153,7 +156,7 @@ def predicted_terms(
     else:
         lag = 0.5 * vane_loss(vane, turbulence) / speed**2
     return {
-        "u": BiasTerm(local.u, _LEVEL_UNCERTAINTY * abs(local.u)),
+        "u": BiasTerm(local.u, _OVERSPEEDING_UNCERTAINTY * abs(local.u)),
         "v": _excess_of_scalar_mean(turbulence),
         "w": BiasTerm(local.w, vertical * abs(local.w)),
         "vane_lag": BiasTerm(lag, _LEVEL_UNCERTAINTY * abs(lag)),
