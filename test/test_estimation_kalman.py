@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from estimation_cases import blown, feed, mast, messages, truth_at
 
-from wind_sensors.estimation import EstimatorSettings, make_estimator, process
+from wind_sensors.estimation import EstimatorSettings, HealthLevel, make_estimator, process
 from wind_sensors.estimation import turbulence_process as turbulence
 from wind_sensors.estimation.constants import instruments_of
 from wind_sensors.estimation.filter_state import OUTPUT
@@ -14,7 +14,9 @@ from wind_sensors.estimation.forward import CIRCUMSTANCES, advance_station, adva
 from wind_sensors.estimation.kalman import KalmanCore
 from wind_sensors.estimation.prediction_kernel import overspeeding
 from wind_sensors.estimation.wind_state import component
+from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.station.model import Station
+from wind_sensors.station.signals import Winds
 
 W = turbulence.WIND_STATES
 
@@ -180,6 +182,29 @@ def test_a_longer_lag_helps_until_the_instruments_have_forgotten() -> None:
         errors.append(np.sqrt(np.mean(error**2)))
     assert errors[0] > 1.05 * errors[1]
     assert errors[2] < 1.06 * errors[1]
+
+
+def test_a_lull_in_which_a_cup_tells_two_winds_is_no_certain_one() -> None:
+    """The wind falls below half the cup's speed within its response and stays there."""
+    t = np.arange(1601) * 0.05
+    speed = np.interp(t, [0.0, 30.0, 31.0, 60.0, 61.0, 80.0], [5.0, 5.0, 0.5, 0.5, 5.0, 5.0])
+    speed = speed * (1.0 + 0.05 * np.sin(0.9 * t) + 0.03 * np.sin(2.3 * t))
+    blowing = np.stack((speed, np.zeros_like(t), np.zeros_like(t)), axis=1)
+    station = mast({"pulses_per_revolution": 12, "mu2": 0.0})
+    recording = simulate(
+        station, Scenario(wind=Winds(np.rint(t * 1e9).astype(np.int64), blowing), duration=80.0)
+    )
+    found = process(recording, EstimatorSettings(window=80.0))
+    error = (found.velocity - truth_at(recording, found.time))[:, 0]
+    deviation = np.sqrt(found.covariance[:, 0, 0])
+    since = (found.time - recording.start) * 1e-9
+    lull = (since > 30.5) & (since < 34.0)
+    assert np.abs(error[lull]).max() > 1.0
+    assert np.mean(np.abs(error[lull]) < 2.0 * deviation[lull]) > 0.75
+    steady = ((since > 10.0) & (since < 29.0)) | (since > 66.0)
+    assert deviation[steady].max() < 0.2
+    item = next(i for i in found.health if i.name == "cup lulls")
+    assert item.level == HealthLevel.WARN
 
 
 def test_slot_errors_are_learnt_without_being_told() -> None:

@@ -40,6 +40,7 @@ from wind_sensors.estimation.history import RotorTrack
 from wind_sensors.estimation.intake import Block, Series
 from wind_sensors.estimation.kalman_health import kalman_health
 from wind_sensors.estimation.kalman_kernel import run
+from wind_sensors.estimation.lull_watch import LullWatch
 from wind_sensors.estimation.outputs import HealthItem
 from wind_sensors.estimation.propeller_watch import PropellerWatch
 from wind_sensors.estimation.readings import NoseReader
@@ -142,6 +143,7 @@ class KalmanCore:
         self._readers = [NoseReader(a.name, station, origin) for a in self._axes]
         self._ring: Ring = empty_ring(64, rotors, vanes)
         self.watch = PropellerWatch(first, settings)
+        self.lulls = LullWatch(first, settings)
         self._waiting: list[Block] = []
         self._started = False
         self.restarts = 0
@@ -365,7 +367,7 @@ class KalmanCore:
             with_site_covariance(self._timeline.stations[number], part_of(estimates, here))
             for number, here in self._timeline.parts(time)
         ]
-        return joined(parts)
+        return self.lulls.widened(joined(parts), out.states[:filled, 3])
 
     def finish(self) -> Estimates:
         """No block will follow; the remaining estimates."""

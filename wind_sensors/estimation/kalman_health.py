@@ -19,7 +19,8 @@ _LOST_SHARE = 0.005
 
 
 def kalman_health(core: KalmanCore) -> list[HealthItem]:
-    """Items `<rotor> edges`, `<vane> readings`, `<propeller> angle` and `estimate`."""
+    """Items `<rotor> edges`, `<vane> readings`, `<propeller> angle`, `<rotor> lulls`,
+    `estimate`."""
     f = core.filter
     items = []
     rotors = len(core.rotor_names)
@@ -55,6 +56,7 @@ def kalman_health(core: KalmanCore) -> list[HealthItem]:
             )
         )
     items += core.watch.health(((f.tally[:, 0] > 0) & (f.stride > 0)).tolist())
+    items += core.lulls.health()
     seen = f.innovation[:, 1] > 50.0
     worst = float(ratios[seen].max()) if seen.any() else 1.0
     values = {
