@@ -24,7 +24,7 @@ STATION = Station.model_validate(
             },
         ]
     }
-)  # fmt: skip
+)
 
 
 def main() -> None:

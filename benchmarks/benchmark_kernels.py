@@ -82,13 +82,13 @@ def _station(kind: str) -> Station:
     cup = Cup(
         name="cup", pulses=topic, pulses_per_revolution=4, calibration_distance=0.2,
         distance_constant=1.7, a4=0.8, mu2=0.5,
-    )  # fmt: skip
+    )
     propeller = Propeller(
         name="propeller", pulses=topic, pulses_per_revolution=2, calibration_distance=0.05,
         distance_constant=1.0, mounted_on="vane",
-    )  # fmt: skip
+    )
     members = {"cup": (cup,), "vane": (vane,), "cup and vane": (vane, cup),
-               "propeller-vane": (vane, propeller)}  # fmt: skip
+               "propeller-vane": (vane, propeller)}
     return Station(instruments=members[kind])
 
 
@@ -159,7 +159,7 @@ def main() -> None:
             f"{least * 1e3:.2f} ms", f"{spent / least:.1f}",
             f"{scipy_time * 1e3:.0f} ms (differs by {difference:.1g})",
             f"{scipy_time / spent:.0f} x",
-        )  # fmt: skip
+        )
     for kind in ("cup and vane", "propeller-vane"):
         station = _station(kind)
         spent = best(partial(respond, station, drive))

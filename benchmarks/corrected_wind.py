@@ -138,7 +138,7 @@ def corrected(
         files[0].write_text(f"{diagnosis.verdict}: {names or 'nothing'}", encoding="utf-8")
         for file, station in (
             (files[1], diagnosis.station), (files[2], planted(recording.station, terms)),
-        ):  # fmt: skip
+        ):
             file.write_text(station_to_yaml(station, shipped_profiles()), encoding="utf-8")
     return files[0].read_text(encoding="utf-8"), load_station(files[1]), load_station(files[2])
 
@@ -176,7 +176,7 @@ def station_rows(
                 f"{place}/{path.name}", found,
                 *(closeness(recording, s, method) for s in (recording.station, station, on_own)),
             )
-        )  # fmt: skip
+        )
         progress.advance(task)
     return well, ill
 

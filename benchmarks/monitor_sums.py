@@ -71,7 +71,7 @@ def recorded(station: Station, seconds: float, seed: int, speed: float) -> Recor
     wind = TurbulenceSpec(
         mean_speed=speed, direction=0.5, standard_deviations=(1.1, 0.9, 0.6),
         integral_lengths=(60.0, 40.0, 20.0), seed=seed,
-    )  # fmt: skip
+    )
     return simulate(station, Scenario(wind=wind, duration=seconds, seed=seed))
 
 
@@ -138,7 +138,7 @@ def main() -> None:
         watched(f"healthy, seed {each}", hours, by_reference)
     for name, (instrument, values) in BY_REFERENCE.items():
         watched(name, recorded(planted(name, instrument, values), SECONDS, seed, speed),
-                by_reference)  # fmt: skip
+                by_reference)
     for each in (3, 4):
         pair = with_second_pair(recorded(healthy_station(), 3600.0, each, speed))
         watched(f"second pair, healthy, seed {each}", pair, by_pair)

@@ -65,7 +65,7 @@ CARELESS: dict[str, Source] = {
     "sensor 0.5 m from where stated": {"sensor_position": (0.7, 0.0, 2.0)},
     "odometry 0.2 s late": {"clock": Clock(latency=0.2)},
     "rotor inflow 1 m/s (multirotor)": {"downwash": Downwash(induced_velocity=1.0)},
-}  # fmt: skip
+}
 
 
 def together(sources: dict[str, Source]) -> Source:
@@ -98,7 +98,7 @@ def station(platform: Platform) -> Station:
             ),
         ),
         platform=platform,
-    )  # fmt: skip
+    )
 
 
 def mean_error(trajectory: Trajectory, source: Source, minutes: float) -> FloatArray:
@@ -154,7 +154,7 @@ def main() -> None:
         "", "not known to the estimator",
         *(f"{n}: vector | speed | direction" for n in carriers),
         title="error of the mean wind, % of the apparent wind (5 m/s, sway 5 deg)",
-    )  # fmt: skip
+    )
     with Progress(transient=True) as progress:
         task = progress.add_task("simulating", total=len(rows) * len(carriers))
         for group, name, source in rows:

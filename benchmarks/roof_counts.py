@@ -23,7 +23,7 @@ def main() -> None:
     table = Table(
         "rotor", "seconds", "pulses per s", "no pulse", "one pulse m/s", "counting m/s",
         "second to second m/s", "even", "p", "missing",
-    )  # fmt: skip
+    )
     rotors = [i for i in recording.station.instruments if isinstance(i, Rotor)]
     for rotor in rotors:
         s = count_statistics(recording, rotor.name)
@@ -33,7 +33,7 @@ def main() -> None:
             f"{s.rapid:.3f}", f"{100.0 * s.even:.1f} %",
             f"{s.even_p:.2g}" if math.isfinite(s.even_p) else "too few counts",
             ", ".join(map(str, s.missing)) or "none",
-        )  # fmt: skip
+        )
     console.print(table)
     for one, two in combinations(rotors, 2):
         if one.calibration_distance != two.calibration_distance:

@@ -89,7 +89,7 @@ def change(effect: str, station: Station, size: float, seed: int, without: Signa
     return Change(
         effect, station.kind, float(relative.mean()), float(relative.std()),
         float(jumps[1] / jumps[0] - 1.0), float(turned.mean()), float(turned.std()),
-    )  # fmt: skip
+    )
 
 
 def main() -> None:
@@ -112,7 +112,7 @@ def main() -> None:
         change(effect, station, min(arguments.size, MINIMUM_SIZES[effect].most), station.seed,
                without[station.kind, station.seed])
         for station, effect in track(jobs, "planting")
-    ]  # fmt: skip
+    ]
     print("| effect | station | mean rate | its 2 s means | quick changes | mean angle | its 2 s |")
     print("|---|---|---|---|---|---|---|")
     for each in sorted(changes, key=lambda c: (c.effect, c.kind)):

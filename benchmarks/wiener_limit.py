@@ -48,7 +48,7 @@ STATION = Station.model_validate(
             },
         ]
     }
-)  # fmt: skip
+)
 
 
 class WienerResult(NamedTuple):

@@ -41,7 +41,7 @@ STATION = Station.model_validate(
         ],
         "reference": {"topic": {"topic": "/reference/wind"}, "separation": 0.5},
     }
-)  # fmt: skip
+)
 
 AEROVANE = Station.model_validate(
     {
@@ -58,7 +58,7 @@ AEROVANE = Station.model_validate(
         ],
         "reference": {"topic": {"topic": "/reference/wind"}, "separation": 0.5},
     }
-)  # fmt: skip
+)
 
 
 def _noise(rng: np.random.Generator, n: int, seconds: float, size: float) -> FloatArray:

@@ -62,7 +62,7 @@ class Case:
             keys = self.platform if wrong else {}
             content["platform"] = {
                 "odometry": {"topic": "o"}, "sensor_position": (0.3, 0.0, 1.5), **keys
-            }  # fmt: skip
+            }
         if wrong:
             content["changes"] = self.changes
         return Station.model_validate(content)

@@ -33,7 +33,7 @@ def _processed(error: FloatArray, method: str) -> ProcessedRecording:
     recording = Recording(
         name="made up", station=load_station("mast_cup_vane"), start=START,
         stop=int(time[-1]), truth=Winds(time, true),
-    )  # fmt: skip
+    )
     covariance = np.tile(np.diag([0.04, 0.04, 1.0]), (len(time), 1, 1))
     velocity = true + error
     window = _window(true)
@@ -41,7 +41,7 @@ def _processed(error: FloatArray, method: str) -> ProcessedRecording:
         recording=recording, method=method, time=time, velocity=velocity, covariance=covariance,
         apparent=velocity, apparent_covariance=covariance,
         to_earth=np.tile(np.eye(3), (len(time), 1, 1)), windows=(window,), health=(),
-    )  # fmt: skip
+    )
 
 
 def _window(true: FloatArray) -> WindowStatistics:
@@ -58,7 +58,7 @@ def _window(true: FloatArray) -> WindowStatistics:
         turbulence=np.zeros(3), instrument="cup",
         bias_terms={"u": BiasTerm(0.005, 0.003), "v": BiasTerm(0.014, 0.004),
                     "arithmetic_mean": BiasTerm(0.5, 0.0)},
-    )  # fmt: skip
+    )
 
 
 def _noise(scale: float, seed: int) -> FloatArray:
@@ -69,7 +69,7 @@ def _noise(scale: float, seed: int) -> FloatArray:
 @pytest.fixture(scope="module")
 def results() -> DemoResults:
     return demo_results(_processed(_noise(0.2, 1), "kalman"), _processed(_noise(0.6, 2), "naive"),
-                        None)  # fmt: skip
+                        None)
 
 
 def test_errors_and_coverage_are_those_that_were_put_in(results: DemoResults) -> None:
@@ -103,7 +103,7 @@ def _only(processed: ProcessedRecording, kept: np.ndarray) -> ProcessedRecording
         covariance=processed.covariance[kept], apparent=processed.apparent[kept],
         apparent_covariance=processed.apparent_covariance[kept],
         to_earth=processed.to_earth[kept],
-    )  # fmt: skip
+    )
 
 
 def test_live_agreement_sees_one_changed_bit(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_the_demo_runs_live_and_finds_the_same_numbers_offline(tmp_path: Path) -
          "--duration", "120", "--rate", "30"],
         env=os.environ | {"ROS_LOG_DIR": str(tmp_path)}, capture_output=True, text=True,
         timeout=1800, check=False,
-    )  # fmt: skip
+    )
     assert process.returncode == 0, process.stdout + process.stderr
     assert "largest difference 0\n" in process.stdout
     page = (tmp_path / "out" / "demo.html").read_text(encoding="utf-8")
@@ -219,6 +219,6 @@ def test_the_demo_runs_live_and_finds_the_same_numbers_offline(tmp_path: Path) -
     again = subprocess.run(
         [sys.executable, "-m", "wind_sensors.cli", "demo", "-o", str(tmp_path / "out")],
         capture_output=True, text=True, timeout=600, check=False,
-    )  # fmt: skip
+    )
     assert again.returncode == 2
     assert "exists already" in again.stderr

@@ -508,7 +508,7 @@ def test_a_fit_with_derivatives_carried_along_ends_where_an_exact_one_does() -> 
         [found.terms[0].values["sine"], found.terms[0].values["cosine"],
          found.terms[1].values["time_constant"]],
         best.x, rtol=0.03,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("width", "possible"), [(12.0, True), (38.0, True), (40.0, False)])

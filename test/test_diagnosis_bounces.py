@@ -23,7 +23,7 @@ CHANNEL = "cup/rotor_rate"
 OF_A_CUP = (
     "calibration_drift", "calibration_offset", "bearing_friction", "rotor_inertia",
     "angular_response", "missed_pulses", "extra_pulses", "stuck_sensor", "timestamp_latency",
-)  # fmt: skip
+)
 
 
 def _bouncing(recording: Recording, share: float, seed: int) -> Recording:

@@ -17,7 +17,7 @@ IDENTIFIERS = {
     "vane_inertia", "vane_damping", "vane_imbalance", "missed_pulses", "extra_pulses",
     "encoder_slot_error", "vane_offset", "vane_eccentricity", "potentiometer_gap", "quantisation",
     "low_pass_filter", "stuck_sensor", "sensor_swap", "timestamp_latency", "clock_drift",
-}  # fmt: skip
+}
 
 STATION = Station.model_validate(
     {
@@ -39,7 +39,7 @@ STATION = Station.model_validate(
         ],
         "platform": {"odometry": {"topic": "/odom"}},
     }
-)  # fmt: skip
+)
 
 
 def _placed() -> list[tuple[Effect, str]]:

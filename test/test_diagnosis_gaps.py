@@ -137,7 +137,7 @@ def test_what_floats_leaves_no_trace_in_the_spectrum(width: float) -> None:
         for form, station in (
             ("healthy", STATION), ("floats", station_with_gap(centre, width, 2.0)),
         )
-    }  # fmt: skip
+    }
     assert np.all(bands["floats"] < bands["healthy"] + 0.5)
 
 

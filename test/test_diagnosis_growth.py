@@ -77,7 +77,7 @@ def test_ice_that_grows_is_told_with_its_time() -> None:
                 for t, s in zip(at, share.tolist(), strict=True)
             )
         }
-    )  # fmt: skip
+    )
     found = diagnose(recorded(growing, 53), baseline())
     (finding,) = found.findings
     assert finding.term.key == ("icing", "cup")

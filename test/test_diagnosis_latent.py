@@ -63,7 +63,7 @@ def boat(
                 "velocity_axes": "earth" if earth_axes else "platform",
             },
         }
-    )  # fmt: skip
+    )
     time = t.astype(np.int64) * 1_000_000_000
     zeros = np.zeros(seconds)
     attitude = np.stack([zeros, zeros, np.sin(heading / 2.0), np.cos(heading / 2.0)], 1)
@@ -71,12 +71,12 @@ def boat(
     states = PlatformStates(
         time, attitude, np.stack([reported.real, reported.imag, zeros], 1), np.zeros((seconds, 3)),
         np.zeros((seconds, 3)),
-    )  # fmt: skip
+    )
     return Recording(
         "boat", station, 0, int(time[-1]),
         pulses={"cup": Pulses(time, run / LENGTH / (2.0 * np.pi))},
         angles={"vane": Angles(time, nose)}, platform=states,
-    )  # fmt: skip
+    )
 
 
 def test_motion_is_found_where_the_station_leaves_it_out() -> None:

@@ -131,7 +131,7 @@ def test_what_healthy_days_share_is_in_the_series_for_statistics_have_their_own_
 
 def test_delays_are_not_screened_at_larger_sizes() -> None:
     searcher = searcher_of(prepare(recorded(STATION, 77)), default_baseline(STATION),
-                           catalogue(), {})  # fmt: skip
+                           catalogue(), {})
     larger = {t.effect.name for t in searcher.probes.templates if t.multiple != 1.0}
     assert "calibration_offset" in larger
     assert not larger & {"clock_drift", "timestamp_latency"}

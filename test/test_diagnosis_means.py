@@ -44,14 +44,14 @@ def station_of(cups: tuple[str, ...], vanes: tuple[str, ...]) -> Station:
             "calibration_distance": LENGTH, "starting_speed": 0.3, "distance_constant": 3.0,
         }
         for name in cups
-    ]  # fmt: skip
+    ]
     turning = [
         {
             "name": name, "kind": "vane", "distance_constant": 1.3, "damping_ratio": 0.3,
             "joint_states": {"topic": f"/{name}"},
         }
         for name in vanes
-    ]  # fmt: skip
+    ]
     return Station.model_validate(
         {
             "recording": {"averaging_time": 600.0, "measuring_height": 60.0},
@@ -63,7 +63,7 @@ def station_of(cups: tuple[str, ...], vanes: tuple[str, ...]) -> Station:
 def recording_of(
     station: Station, time: npt.NDArray[np.int64], speed: dict[str, FloatArray],
     heading: dict[str, FloatArray], temperature: FloatArray | None = None,
-) -> Recording:  # fmt: skip
+) -> Recording:
     seconds = np.diff(time) * 1e-9
     pulses = {}
     for name, values in speed.items():
@@ -73,7 +73,7 @@ def recording_of(
         name="mast", station=station, start=int(time[0]), stop=int(time[-1]), pulses=pulses,
         angles={name: Angles(time, values) for name, values in heading.items()},
         temperature=None if temperature is None else Series(time, temperature),
-    )  # fmt: skip
+    )
 
 
 def weather(seed: int, rows: int = ROWS) -> dict[str, FloatArray]:
@@ -114,7 +114,7 @@ def recorded(
     return recording_of(
         station, time, {name: values[name] for name in CUPS},
         {name: values[name] for name in ("vane_a", "vane_b", "vane_c")},
-    )  # fmt: skip
+    )
 
 
 def names(recording: Recording, healthy: Recording | None = None) -> list[tuple[str, str, int]]:
@@ -129,7 +129,7 @@ def test_steady_means_agree_with_the_integrated_equation_of_motion() -> None:
     for keys in (
         {"friction_speed": 1.5}, {"calibration_gain": 0.95}, {"calibration_offset": -0.2},
         {"friction_speed": 1.0, "a4": 0.7}, {"friction_speed": 1.0, "a4": 1.4},
-    ):  # fmt: skip
+    ):
         changed = cup.model_copy(update=keys)
         station = station_of(("cup",), ()).model_copy(update={"instruments": (changed,)})
         for wind in (2.0, 4.0, 9.0):
@@ -138,12 +138,12 @@ def test_steady_means_agree_with_the_integrated_equation_of_motion() -> None:
             y, _ = integrate_rotor(
                 rotor_parameters(changed), 0.0 * ones, wind * ones, 0.0 * ones, ones, 15.0 * ones,
                 0.25, 1, wind, 0.0,
-            )  # fmt: skip
+            )
             one = np.ones(1)
             shown = mean_speed(
                 station, "cup", wind * one, 0.0 * one, 0.0 * one, 15.0 * one,
                 1.225 * one, 0.0 * one,
-            )  # fmt: skip
+            )
             assert shown[0] == pytest.approx(y[-1] + 0.3, abs=2e-3)
 
 
@@ -373,7 +373,7 @@ def test_sets_of_vanes_are_numbered_after_those_of_pairs() -> None:
     recording = recording_of(
         station_of(CUPS, vanes), time, {name: values[name] for name in CUPS},
         {name: values[name] for name in vanes},
-    )  # fmt: skip
+    )
     phases: dict[str, float] = {}
     outcome = diagnose_means(recording, {}, progress=phases.__setitem__)
     sets: dict[int, set[tuple[str, str]]] = {}

@@ -123,10 +123,10 @@ def test_the_json_has_the_stated_shape() -> None:
     content = as_json(diagnosed("vane_offset", "vane", offset=6.0))
     assert set(content) >= {
         "recording", "verdict", "null_calibrated", "findings", "unexplained", "smallest_detectable",
-    }  # fmt: skip
+    }
     finding = content["findings"][0]
     assert set(finding) >= {"effect", "instrument", "located", "physics", "equation", "parameters",
-                            "alternatives", "proof"}  # fmt: skip
+                            "alternatives", "proof"}
     assert set(finding["located"]) >= {"channel", "time", "region", "excess", "unit", "share", "p"}
     assert set(finding["parameters"]["offset"]) == {"value", "low", "high", "unit"}
 

@@ -162,7 +162,7 @@ def test_coarse_readings_are_told_from_those_of_a_vane_that_sticks() -> None:
         half = np.where(np.arange(4000) < 2000, coarse, angle)
         for readings, least, most in (
             (angle, 0.0, 0.02), (sticking, 0.0, 0.15), (half, 0.45, 0.55), (coarse, 0.9, 1.001),
-        ):  # fmt: skip
+        ):
             assert least <= step_statistics(_readings(readings), grid)[0] <= most
     first_half = (np.arange(1000) < 500).astype(float)
     assert step_statistics(_readings(half), grid, first_half)[0] > 0.9

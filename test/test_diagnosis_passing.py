@@ -241,7 +241,7 @@ def test_a_grease_tells_nothing_of_its_stiffening_within_minutes_at_one_temperat
 
 @pytest.mark.parametrize(("begin", "end"), [
     (150.3, None), pytest.param(100.7, 290.1, marks=pytest.mark.slow),
-])  # fmt: skip
+])
 def test_stamps_that_are_late_from_some_moment_on_jump_there(
     begin: float, end: float | None
 ) -> None:
@@ -290,7 +290,7 @@ def test_what_turns_the_whole_wind_is_tried_from_the_best_moment_on(searcher: Se
     assert tried((100.0, None), 1.0, *everywhere) == [(lean.key, (100.0, None))]
     assert tried((100.0, 200.0), 1.0, *everywhere) == [
         (lean.key, (100.0, None)), (lean.key, (100.0, 200.0)),
-    ]  # fmt: skip
+    ]
     # Not where something that always holds is ahead, or nothing begins.
     assert tried((100.0, 200.0), -1.0, *everywhere) == []
     assert tried((0.0, 200.0), 1.0, *everywhere) == []

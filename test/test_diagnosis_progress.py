@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.verdict import diagnose
 
 DISTORTION = {
     "cosine_1": 0.08, "sine_1": -0.04, "cosine_2": 0.05, "sine_2": 0.05, "deflection": 1.0,
-}  # fmt: skip
+}
 
 
 def test_a_phase_that_runs_again_goes_on_from_where_it_was() -> None:
@@ -41,7 +41,7 @@ def test_progress_of_a_diagnosis_never_falls() -> None:
     diagnose(
         recorded(planted, 58), baseline(), effects,
         progress=lambda phase, share: told.setdefault(phase, []).append(share), with_proof=False,
-    )  # fmt: skip
+    )
     assert set(told) == {"simulating the catalogue", "fitting effects", "locating", "proving"}
     for shares in told.values():
         assert all(later >= earlier for earlier, later in itertools.pairwise(shares))

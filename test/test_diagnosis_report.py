@@ -237,7 +237,7 @@ def test_the_page_tells_why_a_name_was_withdrawn() -> None:
     left = replace(found.unexplained, description=f"somewhere; {reason}")
     withdrawn = replace(
         found, verdict="unknown", findings=(), unexplained=left, objection=reason
-    )  # fmt: skip
+    )
     text = page(withdrawn)
     assert reason in text
     assert "is not borne out" not in text

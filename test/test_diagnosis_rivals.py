@@ -37,7 +37,7 @@ from wind_sensors.station.model import Station
 
 DISTORTION = {
     "cosine_1": 0.08, "sine_1": -0.04, "cosine_2": 0.05, "sine_2": 0.05, "deflection": 1.0,
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")

@@ -61,7 +61,7 @@ SLOW = Station.model_validate(
             for entry in STATION.instruments
         ],
     }
-)  # fmt: skip
+)
 """One pulse for every 2.5 m of wind: three in a second."""
 
 
@@ -460,7 +460,7 @@ def test_what_a_recording_does_not_ask_for_is_left_as_stated(
     nothing = Simulated({}, {}, {}, {}, np.zeros(0, dtype=np.bool_))
     found = Fit(
         (offset, lever), 0.0, np.zeros(1), nothing, np.diag([0.01, *[0.3**2] * 3]), 0, 4
-    )  # fmt: skip
+    )
     _, left = without_spare(found, 4.0)
     assert {name for name, value in left.values.items() if value != 0.0} == kept
     assert left.held == set(values) - kept

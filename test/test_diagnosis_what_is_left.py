@@ -82,7 +82,7 @@ def test_what_is_left_on_the_vane_that_carries_a_propeller_speaks_against_its_na
         "name": "propeller", "kind": "propeller", "pulses": {"topic": "/propeller/pulses"},
         "pulses_per_revolution": 6, "calibration_distance": 0.05, "distance_constant": 2.7,
         "mounted_on": "vane" if carried else "", "axis": None if carried else (-1.0, 0.0, 0.0),
-    }  # fmt: skip
+    }
     station = Station.model_validate({"instruments": [propeller, STATION.instrument("vane")]})
     channels = tuple(
         replace(channel, name=f"{instrument}/{channel.kind}", instrument=instrument)
@@ -153,7 +153,7 @@ def test_what_a_vane_shows_beside_the_propeller_that_it_carries_has_to_stand_out
         "name": "cup", "kind": "propeller", "pulses": {"topic": "/cup/pulses"},
         "pulses_per_revolution": 6, "calibration_distance": 0.05, "distance_constant": 2.7,
         "mounted_on": "vane",
-    }  # fmt: skip
+    }
     station = Station.model_validate({"instruments": [carried, STATION.instrument("vane")]})
     seen = replace(searcher.comparison, station=station)
     naming = named(searcher, drift())
@@ -165,6 +165,6 @@ def test_what_a_vane_shows_beside_the_propeller_that_it_carries_has_to_stand_out
             seen, baseline(),
         ).score
         for name in ("cup/rotor_rate", "vane/vane_angle")
-    ]  # fmt: skip
+    ]
     assert left[0] == pytest.approx(300.0 / REMAINDER_SCORES["time"])
     assert left[1] == pytest.approx(REMAINDER_SCORE * left[0])

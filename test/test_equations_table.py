@@ -55,7 +55,7 @@ def public_functions(package: str) -> list[tuple[str, str]]:
             found += [
                 (info.name, name) for name, function in functions
                 if function.__module__ == info.name and not name.startswith("_")
-            ]  # fmt: skip
+            ]
     return found
 
 

@@ -25,7 +25,7 @@ CHANGING: dict[str, Case] = {
         changes=(change("platform", stop=None, clock={"latency": 2.0}),), platform={},
         scenario=SAILING, turn=0.7,
     ),
-}  # fmt: skip
+}
 
 AFLOAT: dict[str, Case] = {
     "scale": Case(platform={"velocity_scale": 1.3}, scenario=SAILING, turn=1.0),
@@ -55,7 +55,7 @@ AFLOAT: dict[str, Case] = {
     "distortion": Case(
         both={"flow_distortion": DISTORTION}, platform={}, scenario=SAILING, turn=1.5
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -94,7 +94,7 @@ MAST: dict[str, Case] = {
     "imbalance on a leaning axis": Case(
         vane={"imbalance": 5.0, "tilt_deg": (4.0, -4.0)}, turn=0.8
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("method", METHODS)

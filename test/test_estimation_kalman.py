@@ -89,7 +89,7 @@ def test_the_smoother_equals_dense_conditioning_on_the_innovations() -> None:
     unresolved = core.filter.levels[[0, 2]].mean() * turbulence.UNRESOLVED_VARIANCE
     n = core.filter.mean.size
     total = np.array([[float(component(k) == a) for k in range(W)] + [0.0] * (n - W)
-                      for a in range(3)])  # fmt: skip
+                      for a in range(3)])
     outputs = [k for k in range(steps) if ring.kind[k] == OUTPUT]
     for first in outputs[10:100:15]:
         # Innovations are white: each depends on the state at `first` through the chain of

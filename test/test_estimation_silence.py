@@ -72,7 +72,7 @@ def told(window: WindowStatistics) -> list[float]:
         *window.vector_mean, *window.bias, window.scalar_mean, window.direction,
         window.corrected_direction_variance, *window.turbulence,
         *(term.value for term in window.bias_terms.values()),
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize("method", ["kalman", "inverse", "naive"])
@@ -251,7 +251,7 @@ def test_messages_seconds_apart_are_used_though_each_is_ahead_of_the_clock() -> 
         (-1.5, "1.5 s behind"), (-30.0, "30.0 s behind"), (-1.7e9, "19676 days behind"),
         (30.0, "30.0 s ahead"), (4e5, "5 days ahead"),
     ],
-)  # fmt: skip
+)
 def test_an_input_on_another_clock_is_named_with_its_offset(shift: float, text: str) -> None:
     estimator = make_estimator(mast(), EstimatorSettings(method="naive"))
     start = 1_800_000_000 * SECOND

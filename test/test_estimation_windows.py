@@ -325,7 +325,7 @@ def test_the_inverse_method_lies_between_naive_and_kalman() -> None:
     rms = {}
     cases: tuple[tuple[Method, float], ...] = (
         ("kalman", 1.0), ("inverse", 1.0), ("inverse", 3.0), ("naive", 1.0),
-    )  # fmt: skip
+    )
     for method, bandwidth in cases:
         found = process(
             recording, EstimatorSettings(method=method, bandwidth=bandwidth, window=90.0)

@@ -141,7 +141,7 @@ def test_what_no_wind_can_be_is_left_out_and_counted(tmp_path: Path) -> None:
             "'hPa' is no unit of a speed",
         ),
     ],
-)  # fmt: skip
+)
 def test_zones_and_units_are_judged_with_the_mapping(mapping: str, told: str) -> None:
     with pytest.raises(UserError) as caught:
         read_mapping(mapping, "map.yaml")

@@ -333,7 +333,7 @@ CHECKED: dict[str, tuple[Callable[[], object], Callable[[], float]]] = {
     "period of a bivane": (lambda: bivane.damped_period(12.0, 4.0, 0.6), lambda: 3.75),
     "length of a bivane": (lambda: bivane.distance_constant(math.pi), lambda: 0.5),
     "bivane between two readings": (lambda: bivane.nyquist_gain(1.0), lambda: 3.0),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", sorted(CHECKED))

@@ -174,7 +174,7 @@ def test_a_long_gap_is_guesswork_and_its_edges_are_not() -> None:
             states.time[keep], states.attitude[keep], states.velocity[keep],
             states.angular_rate[keep], states.position[keep],
         )
-    )  # fmt: skip
+    )
     sample = track.at(states.time[[40, 49, 100, 150]])
     assert sample.known.tolist() == [True, True, False, True]
 
@@ -188,7 +188,7 @@ def test_unordered_doubled_and_broken_states_do_no_harm() -> None:
     mixed = PlatformStates(
         states.time[order], attitude, states.velocity[order], states.angular_rate[order],
         states.position[order],
-    )  # fmt: skip
+    )
     wanted = states.time[[12, 54, 55, 56]]
     clean = PlatformTrack(states).at(wanted).motion
     found = PlatformTrack(mixed).at(wanted).motion
@@ -257,7 +257,7 @@ def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth: b
         apparent[None], spread, motion_at(attitude.as_quat(), velocity, rate), arm, mount,
         attitude_variance=4e-4, velocity_variance=0.01, mounting_variance=1e-4,
         rate_variance=2.5e-3, velocity_in_earth=velocity_in_earth,
-    )[0]  # fmt: skip
+    )[0]
     shown = attitude * Rotation.from_rotvec(0.02 * draw.normal(size=(count, 3)))
     turned = Rotation.from_matrix(mount) * Rotation.from_rotvec(0.01 * draw.normal(size=(count, 3)))
     flow = turned.apply(apparent + draw.normal(size=(count, 3)) * np.sqrt(np.diag(spread)))
@@ -277,7 +277,7 @@ def test_the_winds_covariance_is_that_of_a_sample_of_errors(velocity_in_earth: b
     st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(0.7, 1.4),
     st.sampled_from(["enu", "ned"]), st.sampled_from(["platform", "earth"]),
     st.floats(-30.0, 30.0),
-)  # fmt: skip
+)
 def test_what_a_platform_reports_leads_back_to_what_it_did(
     a: float,
     b: float,
@@ -295,7 +295,7 @@ def test_what_a_platform_reports_leads_back_to_what_it_did(
         ),
         velocity_scale=scale, frame=frame, velocity_axes=axes, heading_reference="magnetic",
         magnetic_declination_deg=north,
-    )  # fmt: skip
+    )
     states, _ = swaying_states(count=100)
     motion = Motion(states.attitude, states.velocity, states.angular_rate, states.position)
     back = true_motion(platform, reported_motion(platform, motion), 0.05)
@@ -312,7 +312,7 @@ def test_a_compass_shows_its_deviation_on_top_of_the_magnetic_heading() -> None:
             constant_deg=2.0, sine_deg=5.0, cosine_deg=-3.0, sine_2_deg=1.5, cosine_2_deg=-0.8
         ),
         heading_reference="magnetic", magnetic_declination_deg=8.0,
-    )  # fmt: skip
+    )
     headings = np.arange(0.0, 360.0, 30.0)
     yaw = frames.yaw_from_compass(headings)
     motion = Motion(

@@ -122,7 +122,7 @@ def test_without_odometry_no_wind_is_published_and_it_comes_back() -> None:
             states.time[kept], states.attitude[kept], states.velocity[kept],
             states.angular_rate[kept], states.position[kept],
         ),
-    )  # fmt: skip
+    )
     found = process(gone)
     seconds = (found.time - recording.start) * 1e-9
     assert not np.any((seconds > 50.6) & (seconds < 69.4))
@@ -150,7 +150,7 @@ def test_a_platform_that_falls_silent_is_an_error_of_its_own() -> None:
             states.time[early], states.attitude[early], states.velocity[early],
             states.angular_rate[early], states.position[early],
         ),
-    )  # fmt: skip
+    )
     level, message = health(process(silent), "motion")
     assert level == HealthLevel.ERROR
     assert "no wind is published" in message
@@ -200,7 +200,7 @@ def test_attitude_velocity_and_mounting_enter_the_covariance_as_the_kinematics_s
     station = moving_station(
         attitude_noise_deg=1.0, velocity_noise=0.1, mounting_noise_deg=2.0, velocity_axes=axes,
         sensor_rotation_deg=(0.0, 0.0, 30.0),
-    )  # fmt: skip
+    )
     platform = station.platform
     assert platform is not None
     time = np.arange(0, 1_000_000_000, 50_000_000, dtype=np.int64)

@@ -222,7 +222,7 @@ def test_a_stop_within_a_destructor_is_silent_and_other_mistakes_there_are_not(
     done = subprocess.run(
         [sys.executable, "-c", script],
         env=environment, capture_output=True, text=True, timeout=60, check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     assert "_Stopped" not in done.stderr
     assert "ZeroDivisionError" in done.stderr

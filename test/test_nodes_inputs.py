@@ -198,7 +198,7 @@ def test_air_and_counts_that_cannot_be_are_left_out_and_counted(tmp_path: Path) 
     assert not heard.air
     assert {topic: inputs.counts[topic].implausible for topic in ("/t", "/q", "/p")} == {
         "/t": 1, "/q": 1, "/p": 1,
-    }  # fmt: skip
+    }
     told = {name: status.message for name, status in _statuses(inputs).items()}
     assert "1 not plausible" in told["topic /t"] and "`scale`" in told["topic /t"]
 

@@ -104,7 +104,7 @@ def test_simulated_time_stands_still_until_a_receipt_comes(graph: Graph) -> None
     listener.create_subscription(
         JointState, "/vane/joint_states", lambda m: hear("/vane/joint_states", m.header.stamp),
         quality,
-    )  # fmt: skip
+    )
     sender = ReceiptSender(listener, lambda: told)
     simulator = graph.add(
         SimulatorNode,
@@ -112,7 +112,7 @@ def test_simulated_time_stands_still_until_a_receipt_comes(graph: Graph) -> None
             station="mast_cup_vane", speed=1000.0, duration=30.0, wait_for_receipts=1,
             longest_lead=2.0, output_depth=100_000, publish_clock=True,
         ),
-    )  # fmt: skip
+    )
     graph.spin(lambda: simulator.elapsed == 2.0, PATIENT)
     for _ in range(200):
         graph.spin(lambda: True)
@@ -149,7 +149,7 @@ def test_the_simulation_does_not_begin_before_listeners_are_matched(graph: Graph
     outlet.publish(DiagnosticStatus(
         name="teller", values=[KeyValue(key="/truth/wind", value="0"),
                                KeyValue(key="/cup/pulses", value="0")],
-    ))  # fmt: skip
+    ))
     graph.spin(lambda: simulator._book.is_open, PATIENT)
     assert simulator._lonely_topics() == ["/cup/pulses"]
     teller.create_subscription(Header, "/cup/pulses", lambda _: None, input_quality(reliable=True))
@@ -167,7 +167,7 @@ def test_the_simulation_does_not_begin_before_the_results_have_their_listener(
             station="mast_cup_vane", use_sim_time=True, reliable_inputs=True, send_receipts=True,
             wait_for_subscribers=1, silence=600.0,
         ),
-    )  # fmt: skip
+    )
     simulator = graph.add(
         SimulatorNode,
         parameter_overrides=overrides(

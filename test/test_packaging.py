@@ -101,7 +101,7 @@ def test_nodes_start_without_the_libraries_of_bags_and_screens() -> None:
     started = subprocess.run(
         [sys.executable, "-c", START_OF_A_NODE, *of_nodes],
         cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    )
     assert (started.stdout, started.returncode) == ("cup\n", 0), started.stderr
 
 

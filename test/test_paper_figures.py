@@ -106,7 +106,7 @@ SHOWN: dict[str, tuple[str, int, float, float, float]] = {
         "j80-4", 3, 1.5 * math.pi, distorted(1.5 * math.pi), 1e-3,
     ),
     "J80 (5), Fig. 4 at its peak": ("j80-4", 3, 2.0, distorted(2.0), 1e-3),
-}  # fmt: skip
+}
 """Figure, line, where, what is there, and how nearly."""
 
 
@@ -132,7 +132,7 @@ def test_figure_13_shows_both_limits() -> None:
         area = integrate.quad(
             lambda s: (1.0 - 1.0 / ((1.0 - s * s) ** 2 + 4.0 * zeta**2 * s * s)) * s**-slope,
             edge, math.inf,
-        )[0]  # fmt: skip
+        )[0]
         x, y = curve("k94-13", number)
         expected = (slope - 1.0) * edge ** (slope - 1.0) * area
         assert float(np.interp(slope, x, y)) == pytest.approx(expected, abs=1e-3)

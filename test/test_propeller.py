@@ -228,7 +228,7 @@ def gain_of_kernel(form: int, angle: float, wave: float, across: bool) -> comple
     y, _ = integrate_rotor(
         parameters, axial, transverse, np.zeros(axial.size), np.ones(axial.size),
         np.full(axial.size, 15.0), dt, 1, math.nan, 0.0,
-    )  # fmt: skip
+    )
     last = slice(-2 * count, None)
     return complex(2.0 * np.mean(y[last] * 1j * np.exp(-1j * phase[last])) / 1e-3)
 

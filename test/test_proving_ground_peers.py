@@ -106,7 +106,7 @@ def test_the_comparison_runs_from_regressors_to_the_page(
         np.savez(
             regress.regressor_file(tmp_path, place), residual=residual, signatures=signatures,
             effects=effects, sizes=np.ones(3), channel=np.zeros(600, dtype=int),
-        )  # fmt: skip
+        )
     cause = {"effect": "vane_offset", "size_factor": 3.0}
     answers: dict[str, dict[str, Any]] = {
         "found": {"stratum": "single", "causes": [cause], "without": []},

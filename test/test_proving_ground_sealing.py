@@ -272,7 +272,7 @@ def test_a_name_for_an_effect_taken_out_is_wrong_and_owning_up_is_right() -> Non
     pair = ({"effect": "axis_tilt", "set": 1}, {"effect": "icing", "set": 1})
     for verdict, findings, right in (
         ("unknown", (), 1), ("ambiguous", pair, 1), ("named", one, 0), ("none", (), 0),
-    ):  # fmt: skip
+    ):
         case = judged(("vane_offset",), verdict, findings, 3.0, "withheld", ("vane_offset",))
         rates = {r.title: r for r in promised_rates([case])}
         assert (rates[title].hits, rates[title].total) == (right, 1)

@@ -32,7 +32,7 @@ def counted(rates: FloatArray, keep: int = 1) -> Recording:
                 for name in ("a", "b")
             ]
         }
-    )  # fmt: skip
+    )
     time = np.arange(rates.size + 1, dtype=np.int64) * 1_000_000_000
     total = np.floor(np.concatenate([[0.0], np.cumsum(rates)]) / keep) * keep
     pulses = Pulses(time, total / 4.0)

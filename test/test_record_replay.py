@@ -130,7 +130,7 @@ def test_what_is_replayed_is_what_was_recorded(
     replay = _wind(
         graph.domain, tmp_path, "replay", str(original), "--rate", "20", "--wait-for", "1",
         "--topics", *topics,
-    )  # fmt: skip
+    )
     expected = read_recording(original)
     wanted = len(expected.pulses["cup"].time) + len(expected.angles["vane"].time)
     graph.spin(
@@ -151,7 +151,7 @@ def test_compose_runs_a_station_to_its_end(graph: Graph, tmp_path: Path) -> None
     composing = _wind(
         graph.domain, tmp_path, "compose", "mast_cup_vane", "--rate", "20", "--duration",
         str(SECONDS), "-o", str(target),
-    )  # fmt: skip
+    )
     output, _ = composing.communicate(timeout=180)
     assert composing.returncode == 0, output
     content = read_bag(target / "bag")
@@ -269,7 +269,7 @@ def test_a_full_disk_ends_a_recording_in_words_and_keeps_what_it_has(
     graph.add(
         PlayerNode, content=read_bag(original / "bag"), topics=["/cup/pulses"],
         with_clock=False, wait_for_subscribers=1,
-    )  # fmt: skip
+    )
     graph.spin(lambda: _readable(target / "bag") > 0)
     kept = _readable(target / "bag")
 
@@ -303,7 +303,7 @@ def test_what_was_latched_is_recorded_and_latched_again(graph: Graph, tmp_path: 
     player = graph.add(
         PlayerNode, content=read_bag(target / "bag"), topics=["/robot_description"],
         rate=1000.0, with_clock=False,
-    )  # fmt: skip
+    )
     graph.spin(lambda: player.finished)
     late = graph.listener()
     texts: list[str] = []

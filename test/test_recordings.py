@@ -57,7 +57,7 @@ def test_an_imu_with_a_twist_makes_the_same_platform(tmp_path: Path) -> None:
     moved = Recording(
         "r", station, recording.start, recording.stop, recording.pulses,
         platform=recording.platform,
-    )  # fmt: skip
+    )
     after = read_recording(write_recording(tmp_path / "r", moved)).platform
     assert after is not None and moved.platform is not None
     assert np.allclose(after.velocity, moved.platform.velocity, atol=1e-9)

@@ -140,12 +140,12 @@ def test_single_stamps_far_from_all_others_are_left_out_and_noted(
             time, np.tile([0.0, 0.0, 0.0, 1.0], (time.size, 1)),
             *(np.zeros((time.size, 3)) for _ in range(3)),
         ),
-    )  # fmt: skip
+    )
     after = read_recording(write_recording(tmp_path / "r", before))
     for signal in (
         after.pulses["cup"], after.angles["vane"], after.reference, after.temperature,
         after.platform,
-    ):  # fmt: skip
+    ):
         assert signal is not None
         assert np.array_equal(signal.time, near)
     assert (after.start, after.stop) == (int(near.min()), int(near.max()))

@@ -85,7 +85,7 @@ def test_second_order_expansion_describes_the_torque() -> None:
         series = (
             -sigma + c.a1 * u + c.a2 * w + c.a3 * sigma**2 + c.a4 * u**2 + c.a_vv * v**2
             + c.a5 * w**2 + c.a6 * sigma * u + c.a7 * u * w + c.a8 * w * sigma
-        )  # fmt: skip
+        )
         remainders.append(abs(exact - series) / size**3)
         assert abs(exact - series) < 20.0 * size**3
     assert remainders[1] > 0.0

@@ -41,7 +41,7 @@ def cup(**changes: Any) -> Cup:
     constants: dict[str, Any] = dict(
         name="cup", pulses=TOPIC, pulses_per_revolution=4, calibration_distance=0.2,
         distance_constant=1.7, starting_speed=0.25, mu1=0.05, mu2=0.6, a4=0.8,
-    )  # fmt: skip
+    )
     return Cup(**{**constants, **changes})
 
 
@@ -56,7 +56,7 @@ def propeller(**changes: Any) -> Propeller:
     constants: dict[str, Any] = dict(
         name="propeller", pulses=TOPIC, pulses_per_revolution=2, calibration_distance=0.05,
         distance_constant=1.0,
-    )  # fmt: skip
+    )
     return Propeller(**{**constants, **changes})
 
 
@@ -94,7 +94,7 @@ def at_rest(
     return Motion(
         q, np.tile(np.asarray(velocity, float), (count, 1)),
         np.tile(np.asarray(rate, float), (count, 1)), np.zeros((count, 3)),
-    )  # fmt: skip
+    )
 
 
 def test_a_cup_in_gusts_follows_its_equation() -> None:
@@ -248,7 +248,7 @@ def test_oil_in_the_bearing_holds_a_vane_against_its_mount() -> None:
     angle, _ = integrate_vane(
         vane_parameters(oiled), np.tile((-6.0, 0.0, 0.0), (n, 1)), np.full(n, 0.2),
         np.zeros((n, 2)), np.ones(n), 0.05, 0.0, 0.0,
-    )  # fmt: skip
+    )
     # In a wind that turns with the mount only the fin feels the turning, not the oil.
     lag = 2.0 * oiled.damping_ratio * 0.2 * oiled.distance_constant / 6.0
     assert angle[-1] == pytest.approx(-np.arcsin(lag), rel=0.01)
@@ -411,7 +411,7 @@ def test_flow_distortion_is_a_fourier_series_of_the_direction_in_the_sensor_fram
     factor = (
         1 + 0.05 * np.cos(theta) - 0.03 * np.sin(theta) + 0.02 * np.cos(2 * theta)
         + 0.04 * np.sin(2 * theta)
-    )  # fmt: skip
+    )
     end = respond(station, steady(wind)).rotors["cup"].y[-1]
     assert end == pytest.approx(6.0 * factor, rel=1e-7)
 
@@ -535,7 +535,7 @@ def test_a_change_in_the_middle_is_the_healthy_run_and_then_the_changed_one() ->
     pieces, state = [], None
     for first, last, gain, damping in (
         (0, 200, 1.0, 1.0), (200, 240, 0.9, 1.0), (240, 360, 0.9, 3.0), (360, 499, 1.0, 3.0),
-    ):  # fmt: skip
+    ):
         station = Station(instruments=(vane(damping_factor=damping), cup(calibration_gain=gain)))
         part = Drive(START, drive.dt, drive.wind[first : last + 1])
         piece = respond(station, part, state)
@@ -598,7 +598,7 @@ def test_a_weak_blade_beats_with_what_blows_across_the_shaft() -> None:
                 distance_constant=distance, torque_harmonic=weak / 3.0,
             ),
         )
-    )  # fmt: skip
+    )
     ours = respond(station, steady((forcing, across, 0.0))).rotors["propeller"]
 
     def beat(y: FloatArray, psi: FloatArray) -> float:

@@ -50,7 +50,7 @@ def cup(**changes: Any) -> Cup:
     constants: dict[str, Any] = dict(
         name="cup", pulses=TOPIC, pulses_per_revolution=4, calibration_distance=0.2,
         distance_constant=1.7,
-    )  # fmt: skip
+    )
     return Cup(**{**constants, **changes})
 
 
@@ -102,7 +102,7 @@ def test_edges_come_when_a_fine_integration_says(harmonic: float) -> None:
     wind = np.stack((speed, 0 * speed, 0 * speed), axis=1)
     rotor = cup(torque_harmonic=harmonic, a4=0.8)
     found = seconds(edge_times(respond(Station(instruments=(rotor,)), Drive(START, dt, wind)),
-                               "cup"))  # fmt: skip
+                               "cup"))
     grid = dt * np.arange(count)
 
     def slope(time: float, state: FloatArray) -> list[float]:
@@ -321,7 +321,7 @@ def test_a_propeller_blown_from_behind_still_gives_edges() -> None:
     reverse = Propeller(
         name="cup", pulses=TOPIC, pulses_per_revolution=2, calibration_distance=0.05,
         distance_constant=1.0, axis=(1.0, 0.0, 0.0),
-    )  # fmt: skip
+    )
     wind = np.tile((-5.0, 0.0, 0.0), (200, 1))
     found = respond(Station(instruments=(reverse,)), Drive(START, 0.05, wind))
     assert found.rotors["cup"].y[-1] == pytest.approx(-5.0)
@@ -438,7 +438,7 @@ def test_an_encoder_fed_in_blocks_gives_what_it_gives_at_once() -> None:
         filter_time_constant=0.4, noise_deg=1.0, eccentricity_deg=5.0, play_deg=6.0,
         slew_limit_deg_s=60.0,
         outages=(Outage(start=4.5, stop=6.2),),
-    )  # fmt: skip
+    )
     station = Station(
         instruments=(v,), changes=(Change(start=8.0, instrument="vane", set={"offset_deg": 9.0}),)
     )
@@ -480,7 +480,7 @@ def test_a_shaft_angle_tells_which_way_a_propeller_turns() -> None:
             "pulses_per_revolution": 6, "calibration_distance": 0.05, "distance_constant": 1.0,
             "axis": (1.0, 0.0, 0.0),
         }
-    )  # fmt: skip
+    )
     t = np.arange(401) * 0.05
     wind = np.stack([6.0 * np.sin(2.0 * np.pi * t / 10.0), np.zeros(401), np.zeros(401)], axis=1)
     response = respond(Station(instruments=(propeller,)), Drive(START, 0.05, wind))

@@ -13,7 +13,7 @@ from wind_sensors.station.topic_names import topic_name_fault
 NAMES = (
     "cup", "/cup", "cup/pulses", "/a/b_1/c", "_hidden/cup", "~", "~/pulses", "{ns}/cup",
     "{node}/cup", "cup_{node}", "a__b",
-)  # fmt: skip
+)
 
 FAULTS = {
     "": "is empty",

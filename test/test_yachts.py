@@ -60,7 +60,7 @@ def test_the_commands_lead_from_a_log_to_the_wind(
             ]
         )
         == 0
-    )  # fmt: skip
+    )
     assert str(found) in capsys.readouterr().out.replace("\n", "")
     topics = (found / "bag" / "metadata.yaml").read_text(encoding="utf-8")
     assert {"/wind", "/wind/apparent", "/wind/mean"} <= set(re.findall(r"name: (\S+)", topics))
@@ -79,7 +79,7 @@ def circling() -> Station:
             ],
             "platform": {"odometry": {"topic": "/o"}},
         }
-    )  # fmt: skip
+    )
 
 
 def test_scatter_before_is_the_carriers_speed_and_after_it_the_winds_own() -> None:
@@ -88,7 +88,7 @@ def test_scatter_before_is_the_carriers_speed_and_after_it_the_winds_own() -> No
     scenario = Scenario(
         isotropic_spec(wind, intensity, 60.0, seed=2), duration=600.0,
         trajectory=Trajectory("circle", speed=speed, turn_seconds=60.0), platform_noise=False,
-    )  # fmt: skip
+    )
     recording = simulate(circling(), scenario)
     scatter = heading_scatter(process(recording, EstimatorSettings(output_rate=5.0)))
     assert recording.truth is not None
@@ -101,7 +101,7 @@ def test_a_straight_course_cannot_show_it_and_says_so() -> None:
     scenario = Scenario(
         isotropic_spec(8.0, 0.05, 60.0, seed=2), duration=60.0,
         trajectory=Trajectory("hold", speed=3.0),
-    )  # fmt: skip
+    )
     recording = simulate(circling(), scenario)
     with pytest.raises(UserError, match="several headings"):
         heading_scatter(process(recording, EstimatorSettings(output_rate=5.0)))

@@ -40,7 +40,7 @@ MISSING = "Not measured yet."
 PARTS = (
     "about", "rates", "strata", "doses", "coverage", "failures",
     "oracle", "twins", "peers", "real", "sizes", "shares", "versions",
-)  # fmt: skip
+)
 
 
 def blocks(folder: Path) -> dict[str, str]:

@@ -58,7 +58,7 @@ def lines(before: Sequence[Judged], after: Sequence[Judged]) -> list[str]:
             f"{c.before.size:g} | {_told(c.before)} | {_told(c.after)} |"
             for c in found
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _said(judged: Judged) -> tuple[object, ...]:

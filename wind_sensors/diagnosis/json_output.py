@@ -40,7 +40,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
             key: {"value": _rounded(s.value), "unit": s.unit, "parameter": s.parameter}
             for key, s in diagnosis.smallest_detectable.items()
         },
-    }  # fmt: skip
+    }
 
 
 def silent_json(silent: Sequence[Silent]) -> list[dict[str, str]]:
@@ -91,7 +91,7 @@ def finding_json(finding: Finding, length: float) -> dict[str, Any]:
             for name, _, _ in finding.alternatives
             if name in term.effect.confusable
         },
-    }  # fmt: skip
+    }
     if finding.set_number:
         out["set"] = finding.set_number
     if finding.proof is not None:

@@ -261,7 +261,7 @@ def diagnose(
         return searcher_of(
             as_counted(seen, guesses), baseline, known, guesses, workers,
             phases.run("simulating the catalogue"),
-        )  # fmt: skip
+        )
 
     dead_log = [term for term in hidden_by_a_dead_log(comparison) if term.effect.name in known]
     searcher, naming = _explained(comparison, search, dead_log, phases)

@@ -52,7 +52,7 @@ def array_estimates(
     return Estimates(
         times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, covariance,
         to_earth,
-    )  # fmt: skip
+    )
 
 
 class _ArrayCore:
@@ -201,7 +201,7 @@ class InverseArrayCore(_ArrayCore):
         names = (
             "not converged", "in another's wake (beyond 135 deg)", "near a plane of rotation",
             "two possible roots", "noise beyond any wind",
-        )  # fmt: skip
+        )
         total = max(self._solved, 1)
         values = {
             name: f"{100.0 * count / total:.1f} %"

@@ -151,7 +151,7 @@ def predicted_terms(
         lag = inertial_delta(
             vane.damping_ratio, 0.0, mu2, vane.distance_constant, across,
             one_sided_longitudinal_constant(), speed,
-        )  # fmt: skip
+        )
         translation = _translation(rotor, vane, mu2, across, speed)
     else:
         lag = 0.5 * vane_loss(vane, turbulence) / speed**2

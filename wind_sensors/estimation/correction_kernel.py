@@ -62,7 +62,7 @@ def correct(
 
 @compiled
 def correct_by_reading(f: FilterState, s: Instruments, ring: Ring, slot: int, v: int, angle: float,
-                       half_width: float) -> None:  # fmt: skip
+                       half_width: float) -> None:
     """A vane's reading, already turned into a heading of the nose [rad].
 
     With a half width the nose is only known to be within so much of the heading.

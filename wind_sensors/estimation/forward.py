@@ -87,7 +87,7 @@ def rotor_of(s: Instruments, i: int) -> RotorParameters:
     return RotorParameters(
         int(r[0]), r[1], r[2], r[3], r[4], r[5], r[6], s.response[i], r[7], r[8], r[9], r[10],
         r[11], r[12], r[13], r[14], r[15],
-    )  # fmt: skip
+    )
 
 
 @compiled
@@ -254,7 +254,7 @@ def advance_station(
         phi, rate = advance_vane(
             vane_of(s, v), state[j], state[j + 1], (x_0, x_1), (y_0, y_1), (turn_0, turn_1),
             (pull_x, pull_y), c_1[AIR_DENSITY] / s.vane_density[v], dt,
-        )  # fmt: skip
+        )
         out[j] = phi
         out[j + 1] = rate / (1.0 + dt * grip_of(s, v) / (abs(rate) + CREEP))
     for i in range(rotors):
@@ -272,7 +272,7 @@ def advance_station(
             rotor_of(s, i), state[2 * i], state[2 * i + 1], (axial_0, axial_1),
             (transverse_0, transverse_1), (lateral_0, lateral_1),
             c_1[AIR_DENSITY] / s.mounting[i, 6], c_1[AIR_TEMPERATURE], dt,
-        )  # fmt: skip
+        )
         out[2 * i] = y
         out[2 * i + 1] = psi
 

@@ -170,7 +170,7 @@ class InverseCore:
                 self._instruments[number], (0, h.nose_number),
                 (max(turned[1] * length, 0.0), turned[2] * length), nose[:3],
                 _NO_LIFT if lift is None else lift[:3], lift is not None, rows[k],
-            )  # fmt: skip
+            )
             size2 = float(wind[k, 0] ** 2 + wind[k, 1] ** 2)
             away, aside = (level * gap ** (2.0 / 3.0) for gap in (turned[5], nose[5]))
             along[k] = turned[4] * (length * slot * _EDGE_DEVIATION) ** 2 + level * missing + away

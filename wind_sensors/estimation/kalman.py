@@ -218,7 +218,7 @@ class KalmanCore:
         start_filter(
             self.filter, self._instruments, self._rotors, self._axes, blocks, row,
             self._settings.turbulence_intensity, self._origin,
-        )  # fmt: skip
+        )
         self._started = True
 
     def _state_stated_slot_errors(self, blocks: list[Block]) -> None:
@@ -287,12 +287,12 @@ class KalmanCore:
         rows = self._source.at(events.time, self.wind)
         self._make_room(events.time.size)
         out = _Room(1 + int((self._lag + 3 * self._block) * 1e-9 * self._settings.output_rate)
-                    + 1, self.filter.mean.size)  # fmt: skip
+                    + 1, self.filter.mean.size)
         filled = run(
             self.filter, self._instruments, self._ring, events.time, events.kind, events.which,
             events.value, events.extra, rows, block.stop, self._block, self._lag, self._weight,
             out.time, out.states, out.covariance, out.circumstances,
-        )  # fmt: skip
+        )
         if not np.isfinite(self.filter.mean).all() or self._is_astray():
             self._start_again(block)
             return no_estimates()
@@ -361,7 +361,7 @@ class KalmanCore:
         estimates = Estimates(
             time, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor,
             to_earth,
-        )  # fmt: skip
+        )
         self.watch.take(estimates, out.states[:filled, 3 : 3 + 2 * len(self._rotors) : 2])
         parts = [
             with_site_covariance(self._timeline.stations[number], part_of(estimates, here))
@@ -383,11 +383,11 @@ class KalmanCore:
             parts.append(self.finish())
             return Estimates(*(np.concatenate(c) for c in zip(*parts, strict=True)))
         out = _Room(1 + int((self._lag + 3 * self._block) * 1e-9 * self._settings.output_rate)
-                    + 1, self.filter.mean.size)  # fmt: skip
+                    + 1, self.filter.mean.size)
         filled = smooth(
             self.filter, self._instruments, self._ring, int(self.filter.clock[0]), self._weight,
             out.time, out.states, out.covariance, out.circumstances, 0,
-        )  # fmt: skip
+        )
         return self._delivered(out, filled)
 
     def small_scales(self) -> SmallScales | None:

@@ -109,7 +109,7 @@ def run(
             filled = smooth(
                 f, s, ring, end - lag, weight, out_time, out_states, out_covariance,
                 out_circumstances, filled,
-            )  # fmt: skip
+            )
             end += block
             continue
         this = kind[i]

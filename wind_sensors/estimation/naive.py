@@ -64,7 +64,7 @@ def earth_estimates(
     return Estimates(
         times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor,
         to_earth,
-    )  # fmt: skip
+    )
 
 
 class NaiveCore:

@@ -190,7 +190,7 @@ def predict(
         extra[i], second_variance[i] = overspeeding(
             s, i, wind_0, spread, with_rate, f.covariance[w + 2 * i, w + 2 * i], state[2 * i],
             f.circumstances, phi, turn, unresolved,
-        )  # fmt: skip
+        )
     for k in range(w):
         f.mean[k] *= decay[k]
     wind_of(f.mean, wind_1)
@@ -204,7 +204,7 @@ def predict(
     advance_with_jacobian(
         s, wind_0, wind_1, f.circumstances, c, state, dt, reach, out, by_wind_0, by_wind_1,
         by_state,
-    )  # fmt: skip
+    )
     for i in range(rotors):
         out[2 * i] += dt * extra[i]
         out[2 * i + 1] += 0.5 * dt * dt * extra[i] / s.rotor[i, 1]

@@ -302,11 +302,11 @@ class Presence:
             return item(
                 bad, f"The wind's speed has not been measured for {age:.0f} s: nothing comes "
                 f"from {' and '.join(lost)}."
-            )  # fmt: skip
+            )
         if not direction[0]:
             age = min(silence[name] for name in self._azimuths)
             return item(
                 bad, f"The wind's direction has not been measured for {age:.0f} s: nothing comes "
                 f"from {' and '.join(self._azimuths)}."
-            )  # fmt: skip
+            )
         return None

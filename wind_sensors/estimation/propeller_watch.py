@@ -104,7 +104,7 @@ class PropellerWatch:
                 "within 5 deg of its plane": f"{100.0 * plane:.1f} %",
                 "sense of rotation": "forward, assumed" if told_by_edges[self._places[k]]
                 else "measured",
-            }  # fmt: skip
+            }
             level, text = _judged(root, wake, plane, told_by_edges[self._places[k]])
             items.append(HealthItem(f"{propeller.name} angle", level, text, values))
         return items

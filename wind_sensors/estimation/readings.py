@@ -183,4 +183,4 @@ class NoseReader:
         return Headings(
             np.array(time, dtype=np.int64), np.array(angle, dtype=np.float64),
             np.array(half_width, dtype=np.float64),
-        )  # fmt: skip
+        )

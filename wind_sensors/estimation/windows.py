@@ -206,7 +206,7 @@ class WindowAccumulator:
         state = WindowTurbulence(
             speed, vector_speed, float(fluctuation[2, 2]), self._vertical_is_measured,
             SmallScales(s.along / blocks, s.across / blocks),
-        )  # fmt: skip
+        )
         arithmetic = 0.0
         if run.turns and run.interval_turned > 0.0:
             mean_rate = run.interval_turned / run.interval_time

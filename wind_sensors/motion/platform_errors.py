@@ -52,7 +52,7 @@ def heading_without_error(deviation: HeadingDeviation, reported: npt.ArrayLike) 
     terms = np.radians(
         (deviation.constant_deg, deviation.sine_deg, deviation.cosine_deg,
          deviation.sine_2_deg, deviation.cosine_2_deg)
-    )  # fmt: skip
+    )
     result: FloatArray = _undeviated(target.ravel(), *terms).reshape(target.shape)
     return result
 

@@ -53,7 +53,7 @@ class Motion:
         return Motion(
             self.attitude[here], self.velocity[here], self.angular_rate[here], self.position[here],
             None if self.travel is None else self.travel[here],
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class SensorPose(NamedTuple):
     def is_close(self, other: SensorPose) -> bool:
         """Whether both are the same but for rounding."""
         apart = np.abs(np.subtract((*self.position, *self.rotation_deg),
-                                   (*other.position, *other.rotation_deg)))  # fmt: skip
+                                   (*other.position, *other.rotation_deg)))
         return bool(apart.max() < _CLOSE)
 
 

@@ -113,7 +113,7 @@ class WindPublishers:
                 along, spread = wind_in_platform(
                     estimate.velocity, estimate.covariance, estimate.to_earth,
                     sensor_rotation(self.platform),
-                )  # fmt: skip
+                )
                 self._body.publish(_twist(time, self.body_frame_id, along, spread))
             vector = Vector3Stamped()
             vector.header.stamp = time

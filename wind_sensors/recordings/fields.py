@@ -27,7 +27,7 @@ _CODES = {
     "bool": "u1", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1",
     "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
     "int64": "i8", "uint64": "u8", "float64": "f8",
-}  # fmt: skip
+}
 _ENCAPSULATION = 4
 """Bytes before the first field; the second one tells the byte order."""
 

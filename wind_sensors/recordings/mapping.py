@@ -51,7 +51,7 @@ _DIMENSIONS = {
     "Pa": "pressure", "hPa": "pressure", "mbar": "pressure", "kPa": "pressure",
     "%": "share", "m": "length", "mm": "length", "ft": "length",
     "Hz": "frequency", "V": "voltage", "mV": "voltage",
-}  # fmt: skip
+}
 _RAW = frozenset({"", "voltage", "share"})
 """What any signal may come as: the station file's scale and offset make its unit of it."""
 

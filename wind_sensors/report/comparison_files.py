@@ -97,11 +97,11 @@ def write(
             "residual": f.excess, "unit": f.unit, "score": f.score,
         }
         for f in found
-    ]  # fmt: skip
+    ]
     silent = silent_instruments(comparison.recording, comparison.station)
     content = {"recording": comparison.recording.name, "channels": summary,
                "silent": silent_json(silent), "notes": list(comparison.recording.notes),
-               "regions": regions, "p": p}  # fmt: skip
+               "regions": regions, "p": p}
     rows = "".join(
         f"<tr><td>{escape(channel_words(f.region.channel))}</td><td>{escape(f.region.label)}</td>"
         f"<td class='n'>{f.excess:.3g} {escape(f.unit)}</td><td class='n'>{f.score:.1f}</td></tr>"

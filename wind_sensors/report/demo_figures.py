@@ -65,7 +65,7 @@ def biases(results: DemoResults, figure: Figure) -> None:
     axes.bar(
         place, predicted, width=0.55, color=RAW, alpha=0.30, yerr=2.0 * spread,
         error_kw={"ecolor": MUTED, "capsize": 3}, label="predicted (± 2σ)",
-    )  # fmt: skip
+    )
     axes.plot(place, found, "D", color=RAW, ms=6, label="found in the raw mean")
     axes.plot(place, left, "o", color=CORRECTED, ms=6, label="left after correction")
     axes.axhline(0.0, color=INK, lw=0.8)

@@ -128,7 +128,7 @@ def residual_figure(
             (by_direction, clockwise, np.arange(0.0, 361.0, 10.0),
              "wind from, deg " + ("from the bow" if on_platform else "from north")),
             (by_speed, comparison.speed, speeds, "wind speed in m/s"),
-        ):  # fmt: skip
+        ):
             pairs = [(before, style.RAW)]
             if corrected is not None:
                 pairs.append((after, style.CORRECTED))
@@ -190,7 +190,7 @@ def statistics_figure(
         rows = np.arange(shown.size)
         for values, colour, label in (
             (before, style.RAW, "before"), (after, style.CORRECTED, "with it")
-        ):  # fmt: skip
+        ):
             if label == "with it" and corrected is None:
                 continue
             drawn = np.clip(np.nan_to_num(values[shown]), -_FURTHEST, _FURTHEST)
@@ -202,14 +202,14 @@ def statistics_figure(
                         f"{value:.0f}", (float(np.clip(value, -_FURTHEST, _FURTHEST)), row),
                         xytext=(-8 if value > 0.0 else 8, 0), textcoords="offset points",
                         ha=side, va="center", color=colour,
-                    )  # fmt: skip
+                    )
         axes.axvline(0.0, color=style.MUTED, linewidth=0.8)
         axes.set_yticks(rows, [labels[k] for k in shown])
         axes.invert_yaxis()
         made.suptitle(
             f"Raw signals, {channel_words(channel.name)}",
             x=0.01, ha="left", fontsize=11, fontweight="bold", color=style.INK,
-        )  # fmt: skip
+        )
         scale = "recorded minus simulated,\nin standard deviations of healthy days"
         axes.set_xlabel(scale if is_narrow(width) else scale.replace("\n", " "))
         if corrected is not None:

@@ -220,7 +220,7 @@ def _checks(proof: Proof) -> str:
         ("fitted to the calmer half of the blocks, it removes in the windier half",
          proof.transfer, "%"),
         ("residuals within the band that holds 95 % on a healthy day", proof.coverage, "%"),
-    ]  # fmt: skip
+    ]
     cells = [
         (text, f"{100.0 * value:.0f} {unit}") for text, value, unit in rows if value is not None
     ]
@@ -229,7 +229,7 @@ def _checks(proof: Proof) -> str:
         cells.append(
             ("largest correlation of the residual with the wind, within 10 s",
              f"{before:.2f} before, {after:.2f} after")
-        )  # fmt: skip
+        )
     if not cells:
         return ""
     lines = "".join(f"<tr><td>{escape(text)}</td><td>{value}</td></tr>" for text, value in cells)

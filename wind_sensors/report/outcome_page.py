@@ -29,7 +29,7 @@ def panel_figure(panels: list[Panel], width: float) -> Figure:
             axis.errorbar(
                 panel.at, panel.before, 2.0 * panel.error, fmt=".-", color="#b96a1c",
                 linewidth=0.8, markersize=4, label="before",
-            )  # fmt: skip
+            )
             axis.plot(panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after")
             axis.set_xlabel(panel.axis)
             axis.set_ylabel(panel.unit)

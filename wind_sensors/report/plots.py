@@ -170,7 +170,7 @@ def spectra_figure(recording: Recording, estimates: Estimates | None) -> Figure 
         level = top * (line / line[0]) ** (-2.0 / 3.0)
         panel.loglog(line, level, color=style.MUTED, ls="--", lw=1.0)
         panel.annotate("slope -2/3", np.exp(np.log((line, level)).mean(axis=1)), (4, 5),
-                       color=style.MUTED, textcoords="offset points")  # fmt: skip
+                       color=style.MUTED, textcoords="offset points")
     panel.set_ylim(top * 1e-4, top * 2.0)
     panel.set_xlabel("frequency [Hz]")
     panel.set_ylabel("frequency x spectral density [m\u00b2/s\u00b2]")
@@ -195,7 +195,7 @@ def phase_figure(recording: Recording) -> Figure | None:
         slots, mean, error = slot_durations(pulses, rotor.pulses_per_revolution)
         panel.axhline(0.0, color=style.MUTED, lw=1.0)
         panel.errorbar(slots + 1, 100.0 * mean, 100.0 * _NINETY_PERCENT * error, fmt="o",
-                       color=style.CORRECTED, ms=5, capsize=3)  # fmt: skip
+                       color=style.CORRECTED, ms=5, capsize=3)
         panel.set_xticks(slots + 1)
         panel.set_xlabel("slot of the turn")
         panel.set_ylabel("longer than average [%]")
@@ -325,7 +325,7 @@ def _speed_band(
     if step <= 0.0:
         _, half = _thinned(seconds, _NINETY_PERCENT * deviation, span, step)
         panel.fill_between(x, middle - half, middle + half, color=style.CORRECTED, alpha=0.2,
-                           lw=0, label="90 % interval")  # fmt: skip
+                           lw=0, label="90 % interval")
 
 
 def _finish(axes: list[Axes], title: str) -> None:

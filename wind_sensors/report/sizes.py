@@ -88,4 +88,4 @@ def _bearing(e: Estimate, station: Station) -> Size:
     return Size(
         "wind from", clockwise(e.value), clockwise(e.high), clockwise(e.low),
         "deg from north" if on_mast else "deg from the bow",
-    )  # fmt: skip
+    )

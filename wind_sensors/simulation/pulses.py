@@ -284,7 +284,7 @@ def passed_slots(response: Response, name: str) -> list[PassedSlots]:
         times, numbers = _edges_of(
             movement.psi[here], movement.rate[here], movement.dt, slot_angles(rotor),
             drive.start_ns, stretch.first * drive.dt,
-        )  # fmt: skip
+        )
         end = drive.start_ns + round(stretch.last * drive.dt * 1e9)
         begin = drive.start_ns + round(stretch.first * drive.dt * 1e9)
         rate = movement.rate[here]

@@ -281,7 +281,7 @@ class _Worker:
             {n: (float(y[-1]) / length, float(psi[-1])) for n, (y, psi, length) in
              self.rotors.items()},
             {n: (float(a[-1]), float(r[-1])) for n, (a, r) in self.angles.items()},
-        )  # fmt: skip
+        )
 
     def _known(self, key: Hashable, compute: Callable[[], _Movement]) -> _Movement:
         """What follows from a key in this part of the drive."""
@@ -300,7 +300,7 @@ class _Worker:
         key = (
             parameters, vane.reference_density, self._winds.key(vane),
             self._start.angles.get(name),
-        )  # fmt: skip
+        )
 
         def turned() -> tuple[FloatArray, FloatArray]:
             flow = self._winds.flow(vane)
@@ -354,7 +354,7 @@ class _Worker:
         key = (
             numbers, parameters.angular_response.tobytes(), rotor.reference_density,
             self._nodes[rotor.name], self._start.rotors.get(rotor.name), axes_key,
-        )  # fmt: skip
+        )
 
         def rotated() -> tuple[FloatArray, FloatArray]:
             carrier = self.angles.get(rotor.mounted_on) if isinstance(rotor, Propeller) else None
@@ -399,4 +399,4 @@ class _Worker:
             parameters, axial, transverse, lateral, self._density_ratio(rotor.reference_density),
             temperature, self._drive.dt, self._nodes[rotor.name],
             rate * rotor.calibration_distance, psi,
-        )  # fmt: skip
+        )

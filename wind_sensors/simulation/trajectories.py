@@ -155,7 +155,7 @@ def rover(speed: float = 1.5, course: float = 0.0, seed: int = 0) -> Trajectory:
     return Trajectory(
         pattern="legs", speed=speed, course=course, turn_seconds=60.0, corner_seconds=4.0,
         roll=0.02, pitch=0.02, yaw=0.01, sway_period=1.5, seed=seed,
-    )  # fmt: skip
+    )
 
 
 def boat(speed: float = 2.5, course: float = 0.0, seed: int = 0) -> Trajectory:
@@ -163,7 +163,7 @@ def boat(speed: float = 2.5, course: float = 0.0, seed: int = 0) -> Trajectory:
     return Trajectory(
         pattern="circle", speed=speed, course=course, turn_seconds=180.0,
         roll=0.06, pitch=0.03, yaw=0.03, heave=0.2, sway_period=4.0, seed=seed,
-    )  # fmt: skip
+    )
 
 
 def multirotor(speed: float = 0.0, course: float = 0.0, seed: int = 0) -> Trajectory:
@@ -172,7 +172,7 @@ def multirotor(speed: float = 0.0, course: float = 0.0, seed: int = 0) -> Trajec
         pattern="legs" if speed > 0.0 else "hold", speed=speed, course=course, turn_seconds=40.0,
         corner_seconds=4.0, keeps_heading=True, roll=0.02, pitch=0.02, yaw=0.02, drift=0.15,
         heave=0.1, sway_period=2.5, lean_per_airspeed=0.02, gust_share=0.15, seed=seed,
-    )  # fmt: skip
+    )
 
 
 def fixed_wing(speed: float = 16.0, course: float = 0.0, seed: int = 0) -> Trajectory:
@@ -180,7 +180,7 @@ def fixed_wing(speed: float = 16.0, course: float = 0.0, seed: int = 0) -> Traje
     return Trajectory(
         pattern="circle", speed=speed, course=course, turn_seconds=60.0, banked=True,
         roll=0.03, pitch=0.02, yaw=0.01, heave=0.3, sway_period=3.0, gust_share=0.3, seed=seed,
-    )  # fmt: skip
+    )
 
 
 CARRIERS = {"rover": rover, "boat": boat, "multirotor": multirotor, "fixed-wing": fixed_wing}

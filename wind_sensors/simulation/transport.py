@@ -123,7 +123,7 @@ class Transport:
         columns = zip(
             arrival[kept].tolist(), shown[kept].tolist(), values[kept].tolist(),
             counts[kept].tolist(), strict=True,
-        )  # fmt: skip
+        )
         return [Event(a, source, s, tuple(v), c) for a, s, v, c in columns]
 
 

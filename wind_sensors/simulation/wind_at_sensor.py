@@ -184,7 +184,7 @@ class WindAtSensors:
             _scale_by_fourier(
                 in_sensor, distortion.cosine_1, distortion.sine_1, distortion.cosine_2,
                 distortion.sine_2, distortion.deflection,
-            )  # fmt: skip
+            )
         count = wind.shape[0]
         turning = np.zeros((count, 3))
         gravity = np.zeros((count, 3))

@@ -358,7 +358,7 @@ def with_effect(
                     set=effect.update(entry_of(station, name), effect.scaled(values, share)),
                 )
                 for start, stop, share in _stages(begin, end, growth)
-            )  # fmt: skip
+            )
             continue
         keys = effect.update(entry_of(station, name), values)
         if begin <= 0.0 and end is None:

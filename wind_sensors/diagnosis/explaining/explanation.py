@@ -205,7 +205,7 @@ def judged(
         again = fit(
             whitener, searcher.station, candidate.terms, searcher.bank.without, iterations,
             known=candidate if roughly else None, least=ROUGHLY,
-        )  # fmt: skip
+        )
         whitener = searcher.whitener(again.simulated, named)
         again = seen_in(whitener, again)
         return again, penalised_deviance(again, whitener)

@@ -107,7 +107,7 @@ def fit(
         return Fit(
             tuple(terms), start.cost, start.vector, start.simulated, np.zeros((0, 0)),
             problem.evaluations,
-        )  # fmt: skip
+        )
     slopes = None
     if known is not None and known.slopes is not None:
         base = problem.compared(start.simulated)

@@ -99,7 +99,7 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
                 induced_velocity=JET, wake_skew=0.0, forward=forward, leftward=leftward,
             )
             for forward, leftward in JET_SPREADS
-        ]  # fmt: skip
+        ]
         out[jets[0].key] = jets
     clocks = [channel.instrument for channel in comparison.channels]
     for instrument in [*clocks, STATION]:

@@ -157,7 +157,7 @@ def _between(
     return np.asarray(
         summed[..., end, end] - summed[..., begin, end]
         - summed[..., end, begin] + summed[..., begin, begin]
-    )  # fmt: skip
+    )
 
 
 def _combined(gram: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:

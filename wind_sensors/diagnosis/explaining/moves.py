@@ -135,7 +135,7 @@ def _without_each(searcher: Searcher, whitener: Whitener, current: Fit) -> list[
         return fit(
             whitener, searcher.station, part.terms, searcher.bank.without, known=part,
             least=ROUGHLY,
-        )  # fmt: skip
+        )
 
     return in_parallel(without, range(len(current.terms)), searcher.workers)
 
@@ -331,7 +331,7 @@ def swapped(
         without = fit(
             whitener, searcher.station, others, searcher.bank.without, iterations=3, known=part,
             least=ROUGHLY,
-        )  # fmt: skip
+        )
         candidates = [
             starts
             for starts in _in_place_of(searcher, whitener, without, replaced, known)

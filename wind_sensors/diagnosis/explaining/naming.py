@@ -104,7 +104,7 @@ def _named(
     narrow = _greedy(
         searcher, lambda share: report(0.5 + 0.5 * share), replace(first, led=led), everywhere,
         beside,
-    )  # fmt: skip
+    )
     if narrow.fit.terms and _fits_better(searcher, narrow, found):
         return narrow
     simpler = (
@@ -292,7 +292,7 @@ def _settled(
     return Naming(
         current, whitener, adequate, nothing, float(nothing @ nothing) - current.cost,
         alternatives, screened,
-    )  # fmt: skip
+    )
 
 
 def _gain_beside(searcher: Searcher, one: Naming, other: Naming) -> float:

@@ -110,7 +110,7 @@ def _best_span(found: IntervalGains, shortest: float) -> _Span | None:
     return _Span(
         float(found.gains[begin, end]), float(net[begin, end]),
         (float(cuts[begin]), float(cuts[end])), found.amplitudes[begin, end],
-    )  # fmt: skip
+    )
 
 
 def _screening_cuts(searcher: Searcher) -> FloatArray:
@@ -162,7 +162,7 @@ def window_starts(
         amplitudes = {
             bank.templates[k].number: multiple * float(a)
             for k, a in zip(members, span.amplitudes, strict=True) if a != 0.0
-        }  # fmt: skip
+        }
         template = bank.templates[members[int(np.argmax(np.abs(span.amplitudes)))]]
         score = Score(
             *key, span.gain, amplitudes, template, amplitudes.get(template.number, 0.0)

@@ -149,7 +149,7 @@ def _frictions(comparison: Comparison, rotor: Rotor) -> list[Term]:
         )
         for brake in BRAKES
         for coefficient in STIFFENINGS
-    ]  # fmt: skip
+    ]
 
 
 def _sticking(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Term]:
@@ -172,7 +172,7 @@ def _sticking(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Te
         )
         for share in STARTING_SPEEDS
         for breakaway in BREAKAWAYS
-    ]  # fmt: skip
+    ]
 
 
 def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> list[Term]:
@@ -201,7 +201,7 @@ def _pulse_guesses(comparison: Comparison, station: Station, rotor: Rotor) -> li
             "extra_pulses", rotor.name,
             bounce_probability=min(short / (1.0 - short), 0.9),
             bounce_delay=float(np.clip(delay, 0.0002, 0.1)),
-        )  # fmt: skip
+        )
         shorter = float(np.mean(relative < 0.3))
         told = shorter > APART * (short - shorter)
         out.append(replace(bounce, held=frozenset({"bounce_delay"}) if told else frozenset()))
@@ -268,7 +268,7 @@ def _losses_by_chance(rotor: Rotor, long: npt.NDArray[np.bool_], speed: FloatArr
     found = suggested(
         "missed_pulses", rotor.name,
         dead_time=0.0, loss_probability=min(share / grown, 0.6), loss_growth=growth,
-    )  # fmt: skip
+    )
     steady = _is_steady(long, lost * share / grown)
     return replace(found, held=frozenset({"loss_growth"}) if steady else frozenset())
 
@@ -283,7 +283,7 @@ def _is_steady(long: npt.NDArray[np.bool_], expected: FloatArray) -> bool:
     for seen, chance in zip(
         np.array_split(long, PARTS_OF_LOSSES), np.array_split(expected, PARTS_OF_LOSSES),
         strict=True,
-    ):  # fmt: skip
+    ):
         wanted, away = float(chance.sum()), float(seen.sum() - chance.sum())
         if abs(away) > max(UNSTEADY * np.sqrt(wanted + 1.0), UNSTEADY_SHARE * wanted):
             return False
@@ -328,7 +328,7 @@ def _dead_times(
     found = [_sorted_between(cuts, *recorded), _sorted_between(cuts, *expected)]
     shortest_few = [
         cell[: int(SHORTEST_SHARE * recorded[1].size) + 1] for cell in found[0]
-    ]  # fmt: skip
+    ]
     best: tuple[int, float, Interval] | None = None
     # The whole record comes first, then what begins or ends in it: a part of it must miss more.
     for begin, end in sorted(
@@ -417,4 +417,4 @@ def _silence(comparison: Comparison, rotor: Rotor, rate: FloatArray) -> list[Ter
             "stuck_sensor", rotor.name,
             start=begin + since, stop=end + since, reading=0.0, known=0.0,
         )
-    ]  # fmt: skip
+    ]

@@ -107,7 +107,7 @@ def scores_of(templates: Sequence[Template], gram: FloatArray, seen: FloatArray)
         score = Score(
             *key, gain, {number: multiple * a for number, a in amplitudes.items()},
             templates[single], multiple * float(seen[single] / power[single]),
-        )  # fmt: skip
+        )
         if key not in found or gain > found[key].gain:
             found[key] = score
     return sorted(found.values(), key=lambda s: -s.gain)

@@ -306,7 +306,7 @@ class Searcher:
                     ROUGHLY,
                 )
                 for k in tried
-            ]  # fmt: skip
+            ]
         ahead = fits[0]
         if len(fits) > 1 and smooths:
             ahead = min(

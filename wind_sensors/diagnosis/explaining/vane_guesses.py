@@ -129,7 +129,7 @@ def _repeats(comparison: Comparison, vane: Angle) -> list[Term]:
             start=float(time[starts[longest]]) + since, stop=float(time[stops[longest]]) + since,
             reading=float(np.degrees(readings.angle[starts[longest]])), known=1.0,
         )
-    ]  # fmt: skip
+    ]
 
 
 def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:

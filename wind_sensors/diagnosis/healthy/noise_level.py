@@ -127,7 +127,7 @@ def excess_of(
             worst = Excess(
                 float(scores[place]), channel.name,
                 float(1.0 / WAVENUMBERS[place]), float(np.exp(above[place])),
-            )  # fmt: skip
+            )
     return worst
 
 

@@ -315,7 +315,7 @@ def _wind_parts(comparison: Comparison) -> list[FloatArray]:
     rank = np.argsort(np.argsort(comparison.speed)) / max(comparison.grid.n - 1, 1)
     heading = comparison.wind_from
     return [*_thirds(rank), np.cos(heading), np.sin(heading), np.cos(2.0 * heading),
-            np.sin(2.0 * heading)]  # fmt: skip
+            np.sin(2.0 * heading)]
 
 
 def in_series(comparison: Comparison, whitened: FloatArray) -> FloatArray:

@@ -42,7 +42,7 @@ FloatArray = npt.NDArray[np.float64]
 EFFECTS = (
     "platform_velocity", "platform_velocity_scale", "heading_deviation", "vane_offset",
     "calibration_drift",
-)  # fmt: skip
+)
 """Effects that a wind which must be the same from all headings can show."""
 
 SEVERAL_HEADINGS = np.radians(20.0)
@@ -107,7 +107,7 @@ def diagnose_latent(
     explained = search(
         bench, latent_effects(station), (PLATFORM, felt.vane, felt.rotor),
         lambda share: progress("headings", share) if progress else None, 3,
-    )  # fmt: skip
+    )
     findings = _findings(felt, bench, explained)
     declined = _declined(bench, station, explained)
     verdict = verdict_on_findings(findings, Unexplained(1.0, 0.0, (), ""), 1.0)
@@ -217,7 +217,7 @@ def _findings(felt: Felt, bench: Bench, explained: Explained) -> tuple[Finding, 
             Finding(
                 term, parameters, place, proof.excess_removed, named.p, others, proof, number,
             )
-        )  # fmt: skip
+        )
         for other, behind in twins.values():
             values = {
                 p.name: Estimate(other.values[p.name], float("nan"), float("nan"), p.unit)
@@ -228,7 +228,7 @@ def _findings(felt: Felt, bench: Bench, explained: Explained) -> tuple[Finding, 
                     other, values, place, proof.excess_removed, named.p,
                     ((term.effect.name, term.instrument, -behind),), None, number,
                 )
-            )  # fmt: skip
+            )
     return tuple(out)
 
 
@@ -308,4 +308,4 @@ def _panels(felt: Felt, before: Station, after: Station) -> tuple[Panel, ...]:
             "apparent wind against ten-minute winds", "heading [deg]", at, by[0], by[1],
             by[0] / np.sqrt(size[filled]), "rms, m/s",
         ),
-    )  # fmt: skip
+    )

@@ -144,7 +144,7 @@ def felt_by(recording: Recording) -> Felt:
     return Felt(
         station, rotor.name, vane.name, elapsed[good], -(speed * nose)[good], motion,
         recording.start, np.unique(block[good], return_inverse=True)[1].astype(np.intp),
-    )  # fmt: skip
+    )
 
 
 def heading_spread(felt: Felt) -> FloatArray:
@@ -166,7 +166,7 @@ def affine(felt: Felt, station: Station) -> tuple[ComplexArray, ComplexArray, Co
         drive = Drive(
             felt.start, BIN, np.tile(np.array(wind), (len(felt), 1)), felt.motion,
             elapsed=float(felt.elapsed[0]),
-        )  # fmt: skip
+        )
         flow = WindAtSensors(station, drive).flow(rotor).wind
         columns.append(turned * (flow[:, 0] + 1j * flow[:, 1]))
     calm, east, north = columns

@@ -70,7 +70,7 @@ def likelihood_of_first(
         rest = np.log(np.maximum(after.speed[name][usable], 0.1)) - z[usable] @ weights
         shifts[name] = (
             rest, rest_before, blocks_of(after)[usable], blocks_of(before)[good],
-        )  # fmt: skip
+        )
     move, error = {}, 0.0
     for name, (rest, rest_before, block, block_before) in shifts.items():
         now = [np.median(rest[block == b]) for b in np.unique(block)]
@@ -109,7 +109,7 @@ def attributed(
         (t, b) for t, b in named.equal
         if t.effect.name == effect and t.instrument != named.term.instrument
         and (t.interval == ALWAYS) == (named.term.interval == ALWAYS)
-    ]  # fmt: skip
+    ]
     if not mirror:
         return named
     first, second = pair

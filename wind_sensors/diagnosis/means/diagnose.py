@@ -196,7 +196,7 @@ def _of_pair(
     explained = search(
         bench, rotor_effects(), names, partial(report, phase), normal=normal,
         wider=None if warm is None else {warm.name: warm},
-    )  # fmt: skip
+    )
     others = [rotor for p in pairs for rotor in p if rotor not in names]
     named = tuple(attributed(n, healthy, averages, names, others) for n in explained.named)
     # Values are those of the fit of all terms together; what moved to the other rotor has its own.
@@ -259,7 +259,7 @@ def _of_vane(
     explained = search(
         found.bench, effects, (vane,), report, MOST_OF_A_VANE,
         (turning,) if healthy is None else (),
-    )  # fmt: skip
+    )
     findings, declined = findings_of_vane(found, explained, standing, number)
     after = planted(station, explained.terms)
     return _Told(findings, declined, [panels.of_vane(found, station, after)])

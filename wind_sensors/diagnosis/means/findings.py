@@ -161,7 +161,7 @@ def findings_of_pair(
             (t, b) for t, b in named.equal
             if t.key != term.key
             and (t.relative_size >= 1.0 or t.effect.name == term.effect.name)
-        ]  # fmt: skip
+        ]
         distinct = {t.key: (t, b) for t, b in reversed(equal)}
         others = tuple((t.effect.name, t.instrument, b) for t, b in named.others[:6])
         others = tuple((t.effect.name, t.instrument, b) for t, b in distinct.values()) + others
@@ -177,7 +177,7 @@ def findings_of_pair(
                 term, _estimates(term, limits), place, float(np.clip(share, 0.0, 1.0)),
                 named.p, others, proof, set_number,
             )
-        )  # fmt: skip
+        )
         rest = [t for j, t in enumerate(explained.terms) if j != k]
         for twin, behind in distinct.values():
             (other,) = fit(bench, rest, (twin,), bench.everything)
@@ -186,7 +186,7 @@ def findings_of_pair(
                     other, _estimates(other, {}), _place(work, other, before), out[-1].share,
                     named.p, ((term.effect.name, term.instrument, -behind),), None, set_number,
                 )
-            )  # fmt: skip
+            )
     return out, notes, _left(work, floor)
 
 
@@ -238,7 +238,7 @@ def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
         f"{silence.sensor}/{'mean_speed' if is_rotor else 'mean_direction'}", "time", begin, end,
         f"{shown} from day {begin / DAY:.2f} to day {end / DAY:.2f}, "
         f"{silence.rows} means of it in wind",
-    )  # fmt: skip
+    )
     unit = "m/s" if is_rotor else "deg"
     step = averages.interval
     return Finding(
@@ -267,7 +267,7 @@ def finding_of_ice(averages: Averages, ice: Ice) -> Finding:
         f"{len(ice.episodes)} episodes, {ice.rows * hours:.1f} h of {ice.cold_rows * hours:.0f} h "
         f"of wind below {COLD:g} degC; {ice.warm_slow * hours:.1f} h of "
         f"{ice.warm_rows * hours:.0f} h above {WARM:g} degC",
-    )  # fmt: skip
+    )
     there = np.concatenate([averages.speed[ice.partner][a : b + 1] for a, b in ice.episodes])
     missing = float(np.nanmean(there)) * (ice.ratio - 1.0)
     return Finding(
@@ -327,7 +327,7 @@ def findings_of_vane(
         region = Region(
             f"{found.vane}/mean_direction", "time", begin, last,
             f"from day {begin / DAY:.0f} to day {last / DAY:.0f}",
-        )  # fmt: skip
+        )
         out.append(
             Finding(
                 term, _estimates(term, limits[given + k]),
@@ -337,5 +337,5 @@ def findings_of_vane(
                 proof_of(named.gain, explained.cost[k], bench.noise.size, named.runner_up),
                 0 if number is None else number + 1 + k,
             )
-        )  # fmt: skip
+        )
     return out, notes

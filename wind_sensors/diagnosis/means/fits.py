@@ -75,7 +75,7 @@ def fit(
             trial = np.array(
                 [np.clip(v, p.low, p.high) for v, (_, p) in
                  zip(values + step_by, names, strict=True)]
-            )  # fmt: skip
+            )
             then = white(trial)
             new = float(huber(then).sum())
             if new < cost:

@@ -113,7 +113,7 @@ def mean_speed(
         out[rows] = _indicated(
             instrument, segment.station, np.hypot(flow[:, 0], flow[:, 1]), intensity[rows],
             temperature[rows], density[rows],
-        )  # fmt: skip
+        )
     return out
 
 

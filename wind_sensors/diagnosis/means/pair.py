@@ -158,7 +158,7 @@ class Pair:
         return mean_speed(
             station, rotor, speed, self.heading, self.intensity, a.temperature, a.density,
             a.elapsed,
-        )  # fmt: skip
+        )
 
     def wind(self, station: Station) -> FloatArray:
         """Wind that both rotors together show, seen through their own inverse models [m/s]."""
@@ -250,14 +250,14 @@ def pair_of(averages: Averages, first: str, second: str, standing: Standing | No
     good = (
         np.isfinite(one) & np.isfinite(two) & np.isfinite(heading)
         & (np.fmax(one, two) > SLOWEST) & (np.fmin(one, two) > SLOWEST_OF_TWO)
-    )  # fmt: skip
+    )
     chosen = thinned(good)
     rows = part(averages, chosen)
     intensity = np.minimum(rows.intensity(first), rows.intensity(second))
     blank = Pair(
         first, second, rows, heading[chosen], intensity, blocks_of(rows), np.ones(len(rows)),
         standing,
-    )  # fmt: skip
+    )
     speed = blank.wind(averages.station)
     residual = blank.residual(averages.station)
     sector, level = cells(speed, blank.heading)

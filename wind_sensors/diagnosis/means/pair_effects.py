@@ -13,7 +13,7 @@ from wind_sensors.diagnosis.effects.definition import Effect, Parameter
 ROTOR_EFFECTS = (
     "wake_shadow", "flow_distortion", "calibration_drift", "calibration_offset",
     "bearing_friction", "torque_asymmetry", "angular_response",
-)  # fmt: skip
+)
 """Effects that leave a trace in a mean speed; the others only shape what the mean hides."""
 
 SINCE_A_MOMENT = ("calibration_drift", "calibration_offset", "vane_offset")

@@ -37,7 +37,7 @@ def _panel(
             rows.append(
                 (0.5 * (low + high), np.median(one), np.median(two),
                  1.25 * np.std(one) / np.sqrt(count))
-            )  # fmt: skip
+            )
     at = np.array(rows).reshape(-1, 4)
     return Panel(title, axis, at[:, 0], at[:, 1], at[:, 2], at[:, 3], unit)
 
@@ -63,7 +63,7 @@ def of_pair(pair: Pair, station: Station, explained: Station) -> list[Panel]:
                after),
         _panel(pair.name, "day", unit, day, np.linspace(day[0], day[-1] + 1e-6, 60), before,
                after),
-    ]  # fmt: skip
+    ]
 
 
 def of_vane(found: VaneBench, station: Station, explained: Station) -> Panel:

@@ -150,7 +150,7 @@ def search(
         candidates = [
             c.term for c in screened.candidates
             if c.term.key not in refused and not _is_taken(c.term, terms)
-        ]  # fmt: skip
+        ]
         trials = _trials(bench, candidates, terms, fits, costs[-1])
         if not trials or trials[0].whole_gain < SMALLEST_GAIN * float(costs[0].sum()):
             break
@@ -173,7 +173,7 @@ def search(
                 terms[-1], p, costs[-1] - cost, _behind(trials[0], equal),
                 _behind(trials[0], others), others[0].gain if others else None,
             )
-        )  # fmt: skip
+        )
         costs.append(cost)
         if progress:
             progress(len(named) / most)

@@ -167,7 +167,7 @@ def ice(averages: Averages, rotor: str, partner: str, expected: FloatArray) -> I
     return Ice(
         rotor, partner, tuple(episodes), rows, cold_rows, warm_rows, warm_slow, float(middle),
         (float(low), float(high)), p,
-    )  # fmt: skip
+    )
 
 
 def without_ice(averages: Averages, found: list[Ice], margin: int = 6) -> Averages:

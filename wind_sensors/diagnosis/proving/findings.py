@@ -237,7 +237,7 @@ def findings_of(
         own = _location(
             naming, bank, vector if passing else naming.nothing,
             beside if passing else whitener.comparison.simulate(baseline.station), term,
-        ) or before[0]  # fmt: skip
+        ) or before[0]
         share = gain / max(misfit - LEAST_NOISE * naming.nothing.size, gain)
         out.append(
             Finding(
@@ -245,7 +245,7 @@ def findings_of(
                 bank.p_value(own.score), behind, proof,
                 k + 1 if any(position == k for position, _ in equal) else 0, gain,
             )
-        )  # fmt: skip
+        )
     for position, alternative in equal:
         term = alternative.fit.terms[-1]
         rival = out[position]
@@ -256,7 +256,7 @@ def findings_of(
                 ((rival.term.effect.name, rival.term.instrument, -0.5 * alternative.behind),),
                 None, position + 1, rival.gain,
             )
-        )  # fmt: skip
+        )
     return tuple(out)
 
 

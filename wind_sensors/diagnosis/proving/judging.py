@@ -152,7 +152,7 @@ def judgement_of(
     locating(1.0)
     findings = findings_of(
         naming, equal, before, bank, baseline, with_proof, workers
-    ) if verdict in CLAIMS else ()  # fmt: skip
+    ) if verdict in CLAIMS else ()
     proving(0.5)
     objection = None
     if findings:

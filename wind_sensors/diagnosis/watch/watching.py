@@ -80,7 +80,7 @@ class Watch:
         self._stated = station
         self.station = self._baseline.station
         missing = [c for c in default_baseline(station).channels if c not in
-                   self._baseline.channels]  # fmt: skip
+                   self._baseline.channels]
         if missing:
             raise UserError(
                 f"the baseline knows nothing of {missing[0]}.",

@@ -328,7 +328,7 @@ def advance_rotor(
     return advance_forced(
         p, y, psi, forced_by(p, axial[0], transverse[0], lateral[0]),
         forced_by(p, axial[1], transverse[1], lateral[1]), density_ratio, temperature, dt,
-    )  # fmt: skip
+    )
 
 
 @compiled
@@ -392,7 +392,7 @@ def advance_forced(
         k_1 = _acceleration(
             p, y, psi, a_0 + f_0 * (a_1 - a_0), b_0 + f_0 * (b_1 - b_0), e_0 + f_0 * (e_1 - e_0),
             x_0 + f_0 * (x_1 - x_0), y_0 + f_0 * (y_1 - y_0), friction, pace,
-        )  # fmt: skip
+        )
         y_2 = _not_beyond_rest(y + 0.5 * step * k_1, y, p.friction)
         psi_2 = psi + 0.5 * step * y * inverse_length
         k_2 = _acceleration(p, y_2, psi_2, a_h, b_h, e_h, x_h, y_h, friction, pace)
@@ -405,7 +405,7 @@ def advance_forced(
             p, y_4, psi_4, a_0 + f_1 * (a_1 - a_0), b_0 + f_1 * (b_1 - b_0),
             e_0 + f_1 * (e_1 - e_0), x_0 + f_1 * (x_1 - x_0), y_0 + f_1 * (y_1 - y_0),
             friction, pace,
-        )  # fmt: skip
+        )
         y_next = y + step / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
         psi += step / 6.0 * (y + 2.0 * y_2 + 2.0 * y_3 + y_4) * inverse_length
         if p.friction > 0.0 and y != 0.0 and y_next * y < 0.0:

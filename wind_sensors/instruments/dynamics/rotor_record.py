@@ -78,7 +78,7 @@ def integrate_rotor(
             y, psi = advance_forced(
                 p, y, psi, _between(now, then, k / nodes), _between(now, then, (k + 1.0) / nodes),
                 density_ratio[i], temperature[i], dt / nodes,
-            )  # fmt: skip
+            )
             position += 1
             y_out[position] = y
             psi_out[position] = psi

@@ -312,7 +312,7 @@ def integrate_vane(
         phi, rate = advance_vane(
             p, phi, rate, (wind[i - 1, 0], wind[i, 0]), (wind[i - 1, 1], wind[i, 1]),
             (yaw_rate[i - 1], yaw_rate[i]), (gravity[i, 0], gravity[i, 1]), density_ratio[i], dt,
-        )  # fmt: skip
+        )
         phi_out[i] = phi
         rate_out[i] = rate
     return phi_out, rate_out

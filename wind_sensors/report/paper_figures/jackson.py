@@ -37,7 +37,7 @@ def steady_axial(figure: Figure) -> None:
     axes.annotate(
         r"$U_s^2$", (FIGURE_1_STALL_SPEED**2, 0.0), xytext=(0.1, 0.03), color=BLUE,
         arrowprops={"arrowstyle": "->", "color": BLUE},
-    )  # fmt: skip
+    )
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.02, 1.05)
     legend(axes, "upper left")
@@ -63,7 +63,7 @@ def torque_slope(figure: Figure) -> None:
     axes.annotate(
         f"{at_plane:.3f} at 90 deg, not the 0.05 of (9b)", (90.0, at_plane), xytext=(38.0, 0.1),
         color=GREY, fontsize=9, arrowprops={"arrowstyle": "->", "color": GREY},
-    )  # fmt: skip
+    )
     axes.set_xlim(0.0, 90.0)
     axes.set_ylim(0.0, 1.05)
     legend(axes, "lower left")
@@ -106,7 +106,7 @@ def distorted_sinusoid(figure: Figure) -> None:
     axes.plot(
         phase, np.imag(linear * np.exp(1j * phase)), color=GREEN, linestyle="--",
         label=r"linear, time constant $L/\bar U$",
-    )  # fmt: skip
+    )
     for amplitude, color in ((0.2, ORANGE), (0.8, BLUE)):
         rate = propeller_turbulence.sinusoidal_rate(amplitude, frequency, stall)
         axes.plot(

@@ -171,7 +171,7 @@ def recovered_fraction(figure: Figure) -> None:
         axes.annotate(
             rf"$\beta={name}$: {value:.3f}", (beta, value), xytext=(5, 4),
             textcoords="offset points", fontsize=9, color=BLUE,
-        )  # fmt: skip
+        )
     axes.set_xlim(1.0, 3.0)
     axes.set_ylim(0.0, 1.05)
     legend(axes, "lower left")
@@ -191,7 +191,7 @@ def vector_run(figure: Figure) -> None:
     axes.plot(
         [0.0, run.east], [0.0, run.north], color=ORANGE,
         label=f"vector run {run.speed:.1f} m of {run.scalar_speed:.1f} m",
-    )  # fmt: skip
+    )
     axes.set_aspect("equal")
     legend(axes, "upper left")
 

@@ -21,7 +21,7 @@ def longitudinal_spectrum(figure: Figure) -> None:
     axes.annotate(
         r"peak at $k=q\sqrt{3/2}$", (peak, height), xytext=(-8, 3),
         textcoords="offset points", color=ORANGE, fontsize=9, ha="right",
-    )  # fmt: skip
+    )
     right = von_karman.INTEGRAL_LENGTH_TIMES_WAVENUMBER
     axes.axvline(1.0 / right, color=GREY, linewidth=0.8)
     axes.annotate(
