@@ -196,7 +196,8 @@ class Rotor(Instrument):
     inertia_factor: Positive = 1.0
     """Moment of inertia relative to the healthy rotor's."""
     torque_harmonic: NonNegative = 0.0
-    """Amplitude of a once-per-turn torque, relative to the dynamic pressure's."""
+    """Amplitude of a once-per-turn torque, relative to that of the wind times the wind across the
+    shaft: of a cup the whole wind, of a propeller what its vane does not follow."""
     torque_harmonic_phase_deg: float = 0.0
     """Rotor angle of the strong side."""
     electronics: Electronics = Electronics()
