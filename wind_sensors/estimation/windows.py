@@ -232,7 +232,7 @@ class WindowAccumulator:
         covariance, bias_covariance = self._uncertainty(s, speed, change, duration)
         vertical = (terms["w"].uncertainty * speed) ** 2 * np.outer(turn[0], turn[0])
         covariance, bias_covariance = covariance + vertical, bias_covariance + vertical
-        spread = _WIDEST
+        spread = seen if math.isnan(seen) else _WIDEST
         if seen < 1.0:
             spread = min(direction_variance_logarithmic(seen), _WIDEST)
         across_direction = np.array([-math.sin(direction), math.cos(direction), 0.0])
