@@ -343,7 +343,9 @@ def forced_by(p: RotorParameters, axial: float, transverse: float, lateral: floa
     a, b, e = rotor_forcing(p, axial, transverse)
     if p.torque_harmonic == 0.0:
         return a, b, e, 0.0, 0.0
-    return a, b, e, transverse * math.cos(lateral), transverse * math.sin(lateral)
+    # In the calibration's units, as A is: a gain or an offset makes no blade weaker.
+    across = transverse * p.calibration_gain if _is_propeller(p) else a
+    return a, b, e, across * math.cos(lateral), across * math.sin(lateral)
 
 
 @compiled
