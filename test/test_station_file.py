@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wind_sensors.errors import UserError
-from wind_sensors.instruments.dynamics.rotor_record import integrate_rotor
 from wind_sensors.recordings.mapping import mapping_markdown
 from wind_sensors.recordings.station_files import (
     configuration_folder,
@@ -20,7 +18,6 @@ from wind_sensors.recordings.station_files import (
 from wind_sensors.simulation.run import recording_start
 from wind_sensors.station.inputs import resolved
 from wind_sensors.station.model import Cup, Input, Propeller, Station
-from wind_sensors.station.parameters import rotor_parameters
 from wind_sensors.station.reading import read_station
 from wind_sensors.station.reference import schema_markdown
 from wind_sensors.station.schema import KINDS
@@ -222,34 +219,3 @@ def stations(draw: st.DrawFn) -> Station:
 def test_what_is_written_reads_back_as_the_same_station(station: Station) -> None:
     profiles = shipped_profiles()
     assert read_station(station_to_yaml(station, profiles), "s", profiles) == station
-
-
-@pytest.mark.parametrize(
-    ("given", "torque_share"),
-    [({"mu2": -0.7}, 0.02), ({}, 1.0), ({"mu2": -0.7, "a4": 0.0}, 0.0), ({"a4": 0.3}, 0.3)],
-)
-def test_a_propellers_torque_follows_its_form_where_the_file_does_not_say(
-    given: dict[str, float], torque_share: float
-) -> None:
-    """K94 (30), a4 = 0: with the wind along the axis the mean rate is exactly the mean wind's."""
-    propeller = {
-        "kind": "propeller", "name": "p", "pulses": "p", "pulses_per_revolution": 2,
-        "calibration_distance": 0.05, "distance_constant": 1.0, "axis": [1.0, 0.0, 0.0], **given,
-    }
-    station = read_station(str({"instruments": [propeller]}), "given", {})
-    again = read_station(station_to_yaml(station), "again", {})
-    rotor = again.instruments[0]
-    assert again == station
-    assert isinstance(rotor, Propeller)
-    p = rotor_parameters(rotor)
-    assert p.a4 == torque_share
-    time = np.arange(20_001) * 0.01
-    wind = 8.0 * (1.0 + 0.2 * np.sin(2.0 * np.pi * time))
-    still = np.zeros_like(time)
-    y, _ = integrate_rotor(
-        p, wind, still, still, still + 1.0, still + 15.0, 0.01, 1, float("nan"), 0.0
-    )
-    excess = y[10_000:20_000].mean() / wind[10_000:20_000].mean() - 1.0
-    # Second order: a4 <u^2>/U^2 times what the response length of 1 m takes from 1 Hz.
-    lost = 1.0 / (1.0 + (8.0 / (2.0 * np.pi)) ** 2)
-    assert excess == pytest.approx(torque_share * 0.02 * lost, rel=0.05, abs=1e-5)

@@ -178,6 +178,10 @@ class Rotor(Instrument):
     """l0 [m], at the calibration's air density."""
     arm_radius: Positive | None = None
     """Distance of the cups' or blades' middle from the axis [m]."""
+    a4: float = Field(default=1.0, gt=-1.0, lt=3.0)
+    """Share of the torque's slope that follows the wind; 1 follows Kristensen et al. (2014) and, of
+    propellers, Jackson. Nought is a propeller of Kristensen (1994), (30), which does not overspeed:
+    that equation holds while the wind across is much less than that along the shaft."""
     reference_density: Positive = STANDARD_DENSITY
     """Air density of the calibration [kg/m^3]."""
     calibration_gain: Positive = 1.0
@@ -209,19 +213,12 @@ class Cup(Rotor):
 
     kind: Literal["cup"] = "cup"
     """The kind of the instrument."""
-    a4: float = Field(default=1.0, gt=-1.0, lt=3.0)
-    """Share of the torque's slope that follows the wind; 1 follows Kristensen et al. (2014)."""
     starting_speed: float = Field(default=0.0, ge=0.0, lt=5.0)
     """Calibration offset U0 [m/s]: l S = U - U0."""
     mu1: float = Field(default=0.0, gt=-2.0, lt=2.0)
     """Response to the vertical wind, first order, Kristensen (1994), (2)."""
     mu2: float = Field(default=0.0, gt=-3.0, lt=3.0)
     """Response to the vertical wind, second order: 0 cosine, 1 flat."""
-
-
-STARTING_SHARE = 0.02
-"""a4 of a propeller of Kristensen (1994): it overspeeds by so small a share of what Jackson's does,
-and starts after a calm."""
 
 
 class Propeller(Rotor):
@@ -243,18 +240,8 @@ class Propeller(Rotor):
     """f(theta) at `angular_response_deg`; empty: cosine."""
     mu2: float | None = None
     """With a value, the propeller of Kristensen (1994), (30), instead of Jackson's."""
-    a4: float | None = Field(default=None, gt=-1.0, lt=3.0)
-    """Share of the torque's slope that follows the wind. None: 1 without `mu2`, as Jackson has it;
-    0.02 with it, where Kristensen (1994), (30), has 0: such a rotor never starts from rest."""
     angular_response_change: float = Field(default=0.0, gt=-3.0, lt=3.0)
     """Added curvature: f(theta) + change (1 - cos theta) cos theta."""
-
-    @property
-    def torque_share(self) -> float:
-        """a4 [1], by the propeller's form where it is not given."""
-        if self.a4 is not None:
-            return self.a4
-        return 1.0 if self.mu2 is None else STARTING_SHARE
 
     @model_validator(mode="after")
     def _table_is_complete(self) -> Propeller:

@@ -54,12 +54,10 @@ def rotor_parameters(rotor: Cup | Propeller) -> RotorParameters:
     """Arguments of the rotor equation for a cup or propeller of the station."""
     if isinstance(rotor, Cup):
         form, starting_speed, mu1, mu2 = CUP_EQUIVALENT, rotor.starting_speed, rotor.mu1, rotor.mu2
-        a4 = rotor.a4
         table, stall_speed = _NO_TABLE, 0.0
     else:
         form = PROPELLER_JACKSON if rotor.mu2 is None else PROPELLER_KRISTENSEN_1994
         starting_speed, mu1, mu2 = 0.0, 0.0, rotor.mu2 or 0.0
-        a4 = rotor.torque_share
         stall_speed = rotor.stall_speed
         table = response_table(
             rotor.angular_response_deg, rotor.angular_response, rotor.angular_response_change
@@ -69,7 +67,7 @@ def rotor_parameters(rotor: Cup | Propeller) -> RotorParameters:
         calibration_distance=rotor.calibration_distance,
         starting_speed=starting_speed,
         distance_constant=rotor.distance_constant,
-        a4=a4,
+        a4=rotor.a4,
         mu1=mu1,
         mu2=mu2,
         angular_response=table,

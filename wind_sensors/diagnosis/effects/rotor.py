@@ -194,9 +194,7 @@ TORQUE_ASYMMETRY = Effect(
     parameters=(
         Parameter("a4", "1", 0.05, 2.9, healthy=1.0, minimum=0.4, step=0.1, starts=(2.0,)),
     ),
-    # The K94 propeller's a4 is zero by its equation, not by its health.
-    applies=lambda entry, station: isinstance(entry, Cup)
-    or (isinstance(entry, Propeller) and entry.mu2 is None),
+    applies=lambda entry, station: isinstance(entry, Rotor),
     update=_set("a4"),
     form_error=0.15,
     templates=({"a4": 0.6},),
