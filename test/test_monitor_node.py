@@ -23,13 +23,6 @@ DURATION = 740.0
 BLOCKS = 11
 
 
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
-
-
 def _station_file(folder: Path, name: str, changes: list[dict[str, Any]]) -> str:
     document = load_station("mast_cup_vane").model_dump(mode="json", exclude_unset=True)
     document["reference"] = {"topic": "/reference/wind", "separation": 0.5, "path_length": 0.15}

@@ -35,13 +35,6 @@ SPEED = 20.0
 SEED = 5
 
 
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
-
-
 class LiveRun:
     """A simulated station, its estimator and a recorder, run to the end of the simulation."""
 

@@ -36,13 +36,6 @@ START = 1_800_000_000 * SECOND
 STEP = SECOND // 20
 
 
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
-
-
 def _stamp(time: int) -> Time:
     return Time(sec=time // SECOND, nanosec=time % SECOND)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,13 +19,6 @@ from wind_sensors.nodes.estimator_node import EstimatorNode
 from wind_sensors.nodes.kinds import BIVANE, CUP_VANE, PROPELLER_VANE
 from wind_sensors.nodes.parameters import Parameter
 from wind_sensors.nodes.simulator import SimulatorNode
-
-
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
 
 
 def _estimator(graph: Graph, **parameters: Any) -> Any:

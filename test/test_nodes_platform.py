@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import sys
 from importlib.machinery import ModuleSpec
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -23,13 +22,6 @@ from wind_sensors.motion import rotations
 from wind_sensors.nodes.estimator_node import EstimatorNode
 from wind_sensors.nodes.kinds import CUP_VANE
 from wind_sensors.nodes.mounting import tf2_is_installed
-
-
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
 
 
 @pytest.fixture

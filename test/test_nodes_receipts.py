@@ -80,13 +80,6 @@ def test_standing_still_does_not_pile_up_notes() -> None:
     assert len(book._sent) == 1
 
 
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
-
-
 def test_simulated_time_stands_still_until_a_receipt_comes(graph: Graph) -> None:
     listener = graph.listener()
     counts = {"/cup/pulses": 0, "/vane/joint_states": 0}

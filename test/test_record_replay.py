@@ -35,13 +35,6 @@ from wind_sensors.station.signals import Recording
 SECONDS = 20.0
 
 
-@pytest.fixture
-def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    made = Graph(tmp_path, monkeypatch)
-    yield made
-    made.close()
-
-
 @pytest.fixture(scope="module")
 def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
     station = load_station("mast_cup_vane")
