@@ -7,7 +7,7 @@ turns its propeller forward: theta is the angle between the wind velocity and th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -270,6 +270,20 @@ def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
     return np.asarray(change / np.maximum(np.linalg.norm(after, axis=1), 1e-12))
 
 
+def _by_propeller(
+    unit: FloatArray,
+    equations: Sequence[AxialEquation],
+    y: FloatArray,
+    rate: FloatArray,
+    velocity: FloatArray,
+) -> Iterator[tuple[AxialEquation, tuple[FloatArray, FloatArray, FloatArray, FloatArray]]]:
+    """Each propeller's equation, and y, its rate, the speed and the angle of a guess, (n,) each."""
+    speed = np.asarray(np.linalg.norm(velocity, axis=1))
+    angles = wind_angles(unit, velocity)
+    for k, equation in enumerate(equations):
+        yield equation, (y[:, k], rate[:, k], speed, angles[:, k])
+
+
 def _roots(
     unit: FloatArray,
     equations: Sequence[AxialEquation],
@@ -278,12 +292,7 @@ def _roots(
     velocity: FloatArray,
 ) -> AxialInversion:
     """Components of all propellers at the directions of a guess, shape (n, m) each."""
-    speed = np.linalg.norm(velocity, axis=1)
-    angles = wind_angles(unit, velocity)
-    each = [
-        equation.component(y[:, k], rate[:, k], speed, angles[:, k])
-        for k, equation in enumerate(equations)
-    ]
+    each = [e.component(*at) for e, at in _by_propeller(unit, equations, y, rate, velocity)]
     return AxialInversion(*(np.stack(columns, axis=1) for columns in zip(*each, strict=True)))
 
 
@@ -295,12 +304,7 @@ def _residual(
     velocity: FloatArray,
 ) -> FloatArray:
     """All propellers' equations at a trial wind [m^2/s^2], shape (n, m)."""
-    speed = np.linalg.norm(velocity, axis=1)
-    angles = wind_angles(unit, velocity)
-    columns = [
-        equation.residual(y[:, k], rate[:, k], speed, angles[:, k])
-        for k, equation in enumerate(equations)
-    ]
+    columns = [e.residual(*at) for e, at in _by_propeller(unit, equations, y, rate, velocity)]
     return np.stack(columns, axis=1)
 
 
