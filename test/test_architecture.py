@@ -49,7 +49,7 @@ UPWARD = {
 """Imports of the diagnosis that go upwards all the same: who of whom."""
 
 OUTER = {
-    "recordings": {"station", "motion", "estimation"},
+    "recordings": {"station", "motion", "estimation", "diagnosis"},
     "report": {*BELOW, "recordings"},
     "nodes": {*BELOW, "recordings", "processes"},
     "cli": {*BELOW, "recordings", "report", "nodes", "processes"},

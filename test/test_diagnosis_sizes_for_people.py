@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.regions import Found, Region
@@ -130,3 +131,16 @@ def test_what_acts_together_and_what_is_not_told_apart_read_differently() -> Non
     assert names_of([late, *either]) == (
         "clock drift (cup), and calibration offset (cup) or calibration drift (cup)"
     )
+
+
+@given(st.floats(1e-4, 9.9e5) | st.floats(-9.9e5, -1e-4), st.integers(2, 3))
+def test_a_number_is_told_to_its_digits_without_a_power_of_ten(value: float, digits: int) -> None:
+    text = number_text(value, digits)
+    assert "e" not in text
+    assert float(text) == pytest.approx(value, rel=0.51 * 10.0 ** (1 - digits))
+    assert len(text.strip("-").replace(".", "").strip("0")) <= digits
+
+
+def test_very_large_and_unknown_numbers_are_told_as_such() -> None:
+    assert number_text(2.34e7) == "2.34e+07"
+    assert number_text(float("nan")) == "?"

@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nodes_harness import Graph, overrides, status, values
 from ruamel.yaml import YAML
 
+from wind_sensors.diagnosis.healthy.learning import default_baseline
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.monitor import MonitorNode
 from wind_sensors.nodes.simulator import SimulatorNode
@@ -88,3 +89,12 @@ def test_a_baseline_that_is_none_is_refused(graph: Graph, tmp_path: Path) -> Non
     file = _station_file(tmp_path, "healthy.yaml", [])
     with pytest.raises(UserError, match="not a baseline"):
         graph.add(MonitorNode, parameter_overrides=overrides(station=file, baseline=file))
+
+
+def test_a_baseline_of_another_station_is_refused(graph: Graph, tmp_path: Path) -> None:
+    other = load_station("usv")
+    baseline = tmp_path / "baseline.json"
+    baseline.write_text(default_baseline(other).to_json(), encoding="utf-8")
+    file = _station_file(tmp_path, "healthy.yaml", [])
+    with pytest.raises(UserError, match="not the station that is to be judged"):
+        graph.add(MonitorNode, parameter_overrides=overrides(station=file, baseline=str(baseline)))

@@ -17,7 +17,7 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import check_writable, refused_in_words
 from wind_sensors.recordings.reading import home_of, read_recording
 from wind_sensors.station.model import Station
-from wind_sensors.station.sameness import first_difference
+from wind_sensors.station.sameness import refuse_another
 from wind_sensors.station.signals import Recording
 
 
@@ -77,20 +77,9 @@ def read_healthy(
         found.append(read_recording(path, station_file))
         if station is None:
             station = found[0].station
-        _refuse_another(station, found[-1].station, path)
+        refuse_another(station, found[-1].station, path)
         advance()
     return found
-
-
-def _refuse_another(station: Station, healthy: Station, where: str) -> None:
-    difference = first_difference(station, healthy)
-    if difference:
-        raise UserError(
-            f"this is not the station that is to be judged: {difference}.",
-            where,
-            "Name healthy recordings of the same station; if it is the same, make its station "
-            "files agree.",
-        )
 
 
 def learnt(
@@ -130,30 +119,6 @@ def learnt(
         workers(),
         lambda share: progress.update(learning, completed=share),
     )
-
-
-def read_baseline(path: Path, station: Station) -> Baseline:
-    """A baseline from its file.
-
-    Raises:
-        UserError: The file is absent or something else, or of another station.
-    """
-    try:
-        baseline = Baseline.from_json(path.read_text(encoding="utf-8"))
-    except OSError as problem:
-        raise UserError(
-            f"the baseline cannot be read ({problem.strerror}).",
-            str(path),
-            "Make one with `wind baseline HEALTHY... -o FILE`.",
-        ) from None
-    except ValueError:
-        raise UserError(
-            "this is not a baseline of this version.",
-            str(path),
-            "Make one with `wind baseline HEALTHY... -o FILE`.",
-        ) from None
-    _refuse_another(station, baseline.original, str(path))
-    return baseline
 
 
 def run(options: argparse.Namespace) -> int:

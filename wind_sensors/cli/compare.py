@@ -9,7 +9,7 @@ import numpy as np
 from rich.progress import Progress
 from rich.table import Table
 
-from wind_sensors.cli.baseline import learnt, read_baseline
+from wind_sensors.cli.baseline import learnt
 from wind_sensors.cli.diagnose import print_notes
 from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.comparing.preparing import prepare
@@ -17,6 +17,7 @@ from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.explaining.search import searcher_of
 from wind_sensors.diagnosis.regions import region_bank, strongest
 from wind_sensors.errors import UserError
+from wind_sensors.recordings.baseline_file import read_baseline
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.comparison_files import NAMES, NO_READINGS, unread, write

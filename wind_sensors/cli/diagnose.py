@@ -11,13 +11,14 @@ from rich.progress import Progress, TaskID
 from rich.table import Table
 from rich.text import Text
 
-from wind_sensors.cli.baseline import learnt, read_baseline, workers
+from wind_sensors.cli.baseline import learnt, workers
 from wind_sensors.cli.other_references import diagnose_otherwise, other_reference
 from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.definition import Effect
 from wind_sensors.diagnosis.verdict import Diagnosis, diagnose
 from wind_sensors.errors import UserError
+from wind_sensors.recordings.baseline_file import read_baseline
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_recording
 from wind_sensors.report.diagnosis_files import make_way, write

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from wind_sensors.cli.baseline import read_healthy
 from wind_sensors.cli.screen import screen
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
 from wind_sensors.diagnosis.means.healthy import learn_means
@@ -118,9 +119,10 @@ def print_outcome(console: Console, outcome: Outcome) -> None:
         )
         if f.term.effect.name != "stuck_sensor":
             for key, e in f.parameters.items():
-                interval = f" ({e.low:.3g} to {e.high:.3g})" if np.isfinite(e.low) else ""
-                unit = "" if e.unit == "1" else f" {e.unit}"
-                console.print(f"    {key} {e.value:.3g}{unit}{interval}")
+                told = number_text(e.value) + ("" if e.unit == "1" else f" {e.unit}")
+                if np.isfinite(e.low):
+                    told += f" ({number_text(e.low)} to {number_text(e.high)})"
+                console.print(f"    {key} {told}")
         if f.proof is not None:
             console.print(
                 f"    removes {100.0 * f.proof.excess_removed:.0f} % "

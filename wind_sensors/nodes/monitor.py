@@ -15,7 +15,6 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.watch import Finding, Watch, WatchSettings
 from wind_sensors.errors import UserError
 from wind_sensors.estimation.recent import MEMORY, Tally
@@ -32,6 +31,7 @@ from wind_sensors.nodes.station_parameters import (
 from wind_sensors.nodes.topic_health import TopicHealth, graph_reasons, reason_for_silence
 from wind_sensors.nodes.watch_rehearsal import warm_up_watch, watch_must_compile
 from wind_sensors.processes import one_thread_of_linear_algebra
+from wind_sensors.recordings.baseline_file import read_baseline
 from wind_sensors.station.inputs import field_path, field_value, resolved, scaled
 from wind_sensors.station.model import Input, Station
 
@@ -180,7 +180,8 @@ class MonitorNode(Node):
         settings = self._settings(values)
         if settings.drive != "reference":
             self.reference = None
-        baseline = _baseline(str(values["baseline"]))
+        learnt = str(values["baseline"])
+        baseline = read_baseline(Path(learnt), self.station) if learnt else None
         # A look at the last minutes takes seconds, in which messages must not be lost.
         looks = baseline is not None and settings.drive == "reference"
         self._beside = _process_beside() if looks else None
@@ -394,24 +395,6 @@ def finding_values(finding: Finding) -> dict[str, str]:
     values["how sure"] = finding.opinion
     values["to settle it"] = _SETTLE
     return values
-
-
-def _baseline(file: str) -> Baseline | None:
-    """A baseline from its file; None without one.
-
-    Raises:
-        UserError: The file is absent or something else.
-    """
-    if not file:
-        return None
-    remedy = "Make one with `wind baseline HEALTHY... -o FILE`."
-    try:
-        return Baseline.from_json(Path(file).read_text(encoding="utf-8"))
-    except OSError as problem:
-        reason = f"the baseline cannot be read ({problem.strerror})."
-        raise UserError(reason, file, remedy) from None
-    except ValueError:
-        raise UserError("this is not a baseline of this version.", file, remedy) from None
 
 
 def _process_beside() -> ProcessPoolExecutor:

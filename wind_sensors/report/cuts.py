@@ -23,6 +23,18 @@ svg text{font-family:system-ui,-apple-system,"Segoe UI",sans-serif!important}
 """
 """Rules of a page that holds figures in two cuts."""
 
+SCROLL_STYLE = """
+.scroll{overflow-x:auto;background:
+linear-gradient(90deg,#fff 40%,#fff0) local,
+linear-gradient(270deg,#fff 40%,#fff0) 100% 0 local,
+linear-gradient(90deg,#22303c40,#22303c00),
+linear-gradient(270deg,#22303c40,#22303c00) 100% 0;
+background-size:3rem 100%,3rem 100%,.8rem 100%,.8rem 100%;background-repeat:no-repeat}
+@media(max-width:30rem){.scroll table{font-size:.8rem}.scroll th,.scroll td{padding:.3rem .25rem}
+.scroll th.n,.scroll td.n{white-space:normal}}
+"""
+"""Rules of tables in a `scroll` block: a shadow lies on the side where more of it is hidden."""
+
 _NARROW_TITLE = 36
 _NARROW_LABEL = 22
 """So many letters of a title fit above a narrow figure, and of a label beside one."""

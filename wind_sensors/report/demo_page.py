@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from wind_sensors.report.cuts import CUTS_STYLE, in_both_cuts, is_narrow
+from wind_sensors.report.cuts import CUTS_STYLE, SCROLL_STYLE, in_both_cuts, is_narrow
 from wind_sensors.report.demo_figures import Drawing, biases, gust, spectra
 from wind_sensors.report.demo_results import DemoResults, WindowComparison
 from wind_sensors.report.live_agreement import Agreement, shortfalls
@@ -52,7 +52,7 @@ letter-spacing:-.02em;font-variant-numeric:tabular-nums}
 .number>span{color:var(--muted);font-size:.92rem;line-height:1.35;display:block;margin-top:.25rem}
 section{padding:1.4rem 1.4rem 1rem;margin:0 0 1.2rem}
 .raw{color:var(--raw)}.corrected{color:var(--corrected)}.ok{color:var(--ok)}
-.scroll{overflow-x:auto}table{border-collapse:collapse;width:100%;font-size:.93rem}
+table{border-collapse:collapse;width:100%;font-size:.93rem}
 th,td{padding:.4rem .5rem;text-align:right;border-bottom:1px solid var(--line);
 font-variant-numeric:tabular-nums;white-space:nowrap}
 th{color:var(--muted);font-weight:600}th:first-child,td:first-child{text-align:left;padding-left:0}
@@ -77,7 +77,7 @@ def demo_page(results: DemoResults, run: Circumstances) -> str:
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width,initial-scale=1'>"
         "<title>A gusty hour, as the sensors saw it and as it was</title>"
-        f"<style>{_STYLE}{CUTS_STYLE}</style></head><body><main>",
+        f"<style>{_STYLE}{CUTS_STYLE}{SCROLL_STYLE}</style></head><body><main>",
         "<h1>A gusty hour, as the sensors saw it and as it was</h1>",
         f"<p class='lead'>{escape(_lead(run))}</p>",
         _numbers(results, factor),

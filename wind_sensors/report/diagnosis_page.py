@@ -10,6 +10,7 @@ from html import escape
 import numpy as np
 
 from wind_sensors.diagnosis.effects import catalogue
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term
 from wind_sensors.diagnosis.healthy.baseline import Baseline
 from wind_sensors.diagnosis.proving.findings import Finding
@@ -17,7 +18,7 @@ from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.proving.remainder import REMAINDER_P, REMAINDER_SCORES
 from wind_sensors.diagnosis.regions import OF_POWER, Found, Region
 from wind_sensors.diagnosis.verdict import Diagnosis
-from wind_sensors.report.cuts import CUTS_STYLE, in_both_cuts
+from wind_sensors.report.cuts import CUTS_STYLE, SCROLL_STYLE, in_both_cuts
 from wind_sensors.report.diagnosis_figures import (
     activity_figure,
     channel_words,
@@ -25,7 +26,7 @@ from wind_sensors.report.diagnosis_figures import (
     statistics_figure,
 )
 from wind_sensors.report.names import names_of, silence_of, words
-from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
+from wind_sensors.report.sizes import sizes_of, smallest_text
 from wind_sensors.station.model import Angle, Propeller, Rotor, Station
 from wind_sensors.station.silence import Silent
 
@@ -46,9 +47,6 @@ code,.eq{font-family:ui-monospace,monospace;font-size:.92em;overflow-wrap:anywhe
 table{border-collapse:collapse;width:100%;font-size:.95rem}
 th,td{text-align:left;padding:.3rem .5rem;border-bottom:1px solid var(--line);vertical-align:top}
 th.n,td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.scroll{overflow-x:auto}
-@media(max-width:30rem){table{font-size:.8rem}th,td{padding:.3rem .25rem}
-th.n,td.n{white-space:normal}}
 .bar{background:var(--line);border-radius:5px;height:14px;overflow:hidden;max-width:26rem}
 .bar i{display:block;height:100%;background:var(--blue)}
 """
@@ -214,15 +212,18 @@ def _proof(finding: Finding) -> str:
 
 def _checks(proof: Proof) -> str:
     rows = [
-        ("the next-best explanation removes", proof.placebo_removed, "%"),
+        ("the next-best explanation removes", proof.placebo_removed),
         ("smooth curves over the wind speed with as many coefficients remove",
-         proof.curve_removed, "%"),
+         proof.curve_removed),
         ("fitted to the calmer half of the blocks, it removes in the windier half",
-         proof.transfer, "%"),
-        ("residuals within the band that holds 95 % on a healthy day", proof.coverage, "%"),
+         proof.transfer),
+        ("residuals within the band that holds 95 % on a healthy day", proof.coverage),
     ]
     cells = [
-        (text, f"{100.0 * value:.0f} {unit}") for text, value, unit in rows if value is not None
+        # Nought is added lest a little less than nothing be told as -0 %.
+        (text, f"{np.round(100.0 * value) + 0.0:.0f} %")
+        for text, value in rows
+        if value is not None
     ]
     if proof.wind_correlation is not None:
         before, after = proof.wind_correlation
@@ -396,6 +397,6 @@ def document(title: str, body: str) -> str:
     return (
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-        f"<title>{escape(title)}</title><style>{STYLE}{CUTS_STYLE}</style></head>"
+        f"<title>{escape(title)}</title><style>{STYLE}{CUTS_STYLE}{SCROLL_STYLE}</style></head>"
         f"<body><main>{body}</main></body></html>\n"
     )

@@ -9,13 +9,14 @@ from math import isfinite
 
 from matplotlib.figure import Figure
 
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
 from wind_sensors.report.cuts import in_both_cuts, title_for
 from wind_sensors.report.diagnosis_page import VERDICTS, document, silent_paragraphs
 from wind_sensors.report.names import names_of, silence_of, words
-from wind_sensors.report.sizes import number_text, sizes_of, smallest_text
+from wind_sensors.report.sizes import sizes_of, smallest_text
 from wind_sensors.station.model import Station
 
 

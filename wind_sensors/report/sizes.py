@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.report.names import words
 from wind_sensors.station.model import Station
@@ -33,11 +34,6 @@ class Size:
         unit = f" {self.unit}" if self.unit else ""
         interval = f" ({self.low} to {self.high})" if self.low else ""
         return f"{self.name} {self.value}{unit}{interval}"
-
-
-def number_text(value: float) -> str:
-    """Three digits."""
-    return f"{value:.3g}" if np.isfinite(value) else "?"
 
 
 def smallest_text(size: SmallestSize) -> str:

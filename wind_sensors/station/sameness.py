@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wind_sensors.errors import UserError
 from wind_sensors.station.model import AnyInstrument, Station
 
 MADE = (
@@ -47,6 +48,27 @@ def first_difference(one: Station, other: Station) -> str:
         times = (one.recording.averaging_time, other.recording.averaging_time)
         return "recording.averaging_time is {:g} s there and {:g} s here".format(*times)
     return ""
+
+
+def refuse_another(station: Station, healthy: Station, where: str) -> None:
+    """Refuse what was learnt on another station.
+
+    Args:
+        station: The station that is to be judged.
+        healthy: The station of a healthy recording or of a baseline.
+        where: The file of the latter.
+
+    Raises:
+        UserError: They differ.
+    """
+    difference = first_difference(station, healthy)
+    if difference:
+        raise UserError(
+            f"this is not the station that is to be judged: {difference}.",
+            where,
+            "Name healthy recordings of the same station; if it is the same, make its station "
+            "files agree.",
+        )
 
 
 def _unlike(entry: AnyInstrument, other: AnyInstrument) -> str:

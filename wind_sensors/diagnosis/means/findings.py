@@ -10,6 +10,7 @@ from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
+from wind_sensors.diagnosis.effects.wording import parameter_text
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import DAY, Averages
 from wind_sensors.diagnosis.means.bench import Bench, FloatArray, block_sums, halves, huber
@@ -214,10 +215,7 @@ def _left(work: PairWork, floor: FloatArray) -> Unexplained:
 
 def too_small(term: Term) -> str:
     """Why a term that explains held-out blocks is not named, for people."""
-    values = ", ".join(
-        f"{p.name.replace('_', ' ')} {term.values[p.name]:.3g} {p.unit}".removesuffix(" 1")
-        for p in term.effect.parameters
-    )
+    values = ", ".join(parameter_text(p, term.values[p.name]) for p in term.effect.parameters)
     return (
         f"{term.effect.name.replace('_', ' ')} of {term.instrument} ({values}) improves held-out "
         "blocks, but is smaller than what is worth reporting."

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.explaining.detectable import Detectable, smallest_detectable
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.intervals import window_of
@@ -245,6 +246,6 @@ def _description(found: Found) -> str:
         return f"{channel}: {found.region.label} differs from the simulation"
     sign = "above" if found.excess > 0.0 else "below"
     return (
-        f"{channel}: measured {abs(found.excess):.2g} {found.unit} {sign} the simulation, "
-        f"{found.region.label}"
+        f"{channel}: measured {number_text(abs(found.excess), 2)} {found.unit} {sign} "
+        f"the simulation, {found.region.label}"
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from wind_sensors.diagnosis.effects.definition import STATION, Effect, entry_of, touched
 from wind_sensors.diagnosis.effects.suspected import SUSPECTS
+from wind_sensors.diagnosis.effects.wording import parameter_text
 from wind_sensors.diagnosis.explaining.explanation import Naming
 from wind_sensors.diagnosis.explaining.fitting import ROUGHLY, Fit, fit
 from wind_sensors.diagnosis.explaining.search import PENALTY_PER_PARAMETER, interval_penalty
@@ -60,9 +61,7 @@ class Suspicion:
     def words(self) -> str:
         """For people."""
         sizes = ", ".join(
-            f"{p.name.replace('_', ' ')} {self.fault.values[p.name]:.3g}"
-            + ("" if p.unit == "1" else f" {p.unit}")
-            for p in self.fault.effect.parameters
+            parameter_text(p, self.fault.values[p.name]) for p in self.fault.effect.parameters
         )
         against = f" than {self.effect}" if self.effect is not None else ""
         return (

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.diagnosis.effects.definition import Effect
+from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.explaining.screening import Score, group_templates, starting_values
 from wind_sensors.diagnosis.explaining.signatures import Template
 from wind_sensors.diagnosis.watch.evidence import Evidence, Registry, Snapshot
@@ -66,7 +67,8 @@ class Candidate:
 
     def __str__(self) -> str:
         shown = ", ".join(
-            f"{name} about {value:.2g}" + (f" {unit}" if (unit := self.units[name]) != "1" else "")
+            f"{name} about {number_text(value, 2)}"
+            + (f" {unit}" if (unit := self.units[name]) != "1" else "")
             for name, value in self.values.items()
         )
         return f"{self.effect} of {self.instrument} ({100 * self.weight:.0f} %; {shown})"
