@@ -168,7 +168,10 @@ def test_a_frame_that_leans_is_an_axis_that_leans(axis: str, frame: dict[str, fl
     comparison = prepare(flown(uav(), 3))
     leaning = {
         "axis_tilt": ({"tilt_x": 0.0, "tilt_y": 0.0, axis: 7.0}, "station"),
-        "frame_error": ({"roll": 0.0, "pitch": 0.0, "velocity_turn": 0.0, **frame}, "platform"),
+        "frame_error": (
+            {"roll": 0.0, "pitch": 0.0, "velocity_turn": 0.0, "other_axes": 0.0, **frame},
+            "platform",
+        ),
     }
     of_axis, of_frame = (
         comparison.simulate(with_effect(uav(), catalogue()[name], entry, values)).series

@@ -78,7 +78,7 @@ def test_a_frame_that_leans_is_no_rival_of_an_axis_that_leans(
     known = named(searcher, drift())
     axis, frame = (catalogue()[name] for name in ("axis_tilt", "frame_error"))
     tilted = replace(known.fit, terms=(Term(axis, "station", {"tilt_x": 8.0, "tilt_y": 0.0}),))
-    turned = {"roll": 0.0, "pitch": 8.0, "velocity_turn": 1.0}
+    turned = {"roll": 0.0, "pitch": 8.0, "velocity_turn": 1.0, "other_axes": 0.0}
     rival = Alternative(replace(known.fit, terms=(Term(frame, "platform", turned),)), behind)
     assert bool(equal_explanations(replace(known, fit=tilted, alternatives=(rival,)))) is equal
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -281,25 +281,34 @@ HEADING_DEVIATION = Effect(
 )
 
 
+OTHER_AXES: dict[str, Literal["platform", "earth"]] = {"platform": "earth", "earth": "platform"}
+"""Axes in which the velocity may be reported, whichever the station file states."""
+
+
 def _rotation(entry: Entry, values: Values) -> dict[str, Any]:
     assert isinstance(entry, Platform)
     roll, pitch, yaw = entry.sensor_rotation_deg
-    return {
+    keys: dict[str, Any] = {
         "sensor_rotation_deg": (roll + values["roll"], pitch + values["pitch"], yaw),
         "velocity_turn_deg": entry.velocity_turn_deg + values["velocity_turn"],
     }
+    if values["other_axes"] > 0.5:
+        keys["velocity_axes"] = OTHER_AXES[entry.velocity_axes]
+    return keys
 
 
 def _rotation_size(values: Values) -> float:
     lean = math.hypot(values["roll"], values["pitch"])
-    return max(lean, abs(values["velocity_turn"])) / 6.0
+    turn = 90.0 * values["other_axes"]
+    return max(lean, abs(values["velocity_turn"]), turn) / 6.0
 
 
 FRAME_ERROR = Effect(
     name="frame_error",
     meaning="The carrier's velocity or the sensor is in another frame than stated.",
     entrance="wind",
-    equation="V true = R(-turn) V reported; sensor axes = R(roll, pitch) carrier axes",
+    equation="V true = R(-turn) V reported; sensor axes = R(roll, pitch) carrier axes; "
+    "V reported in earth's axes where the carrier's are stated, or the reverse",
     source="REP-103",
     region="with the carrier's speed, or while it leans",
     parameters=(
@@ -309,15 +318,16 @@ FRAME_ERROR = Effect(
             "velocity_turn", "deg", -270.0, 270.0, minimum=6.0, step=1.0,
             starts=(20.0, -20.0, 90.0, -90.0, 180.0), spare=True,
         ),
+        Parameter("other_axes", "1", 0.0, 1.0, value_from="forms"),
     ),
     applies=_is_platform,
     update=_rotation,
     exact=True,
     includes=frozenset({"axis_tilt"}),
     templates=(
-        {"roll": 3.0, "pitch": 0.0, "velocity_turn": 0.0},
-        {"roll": 0.0, "pitch": 3.0, "velocity_turn": 0.0},
-        {"roll": 0.0, "pitch": 0.0, "velocity_turn": 6.0},
+        {"roll": 3.0, "pitch": 0.0, "velocity_turn": 0.0, "other_axes": 0.0},
+        {"roll": 0.0, "pitch": 3.0, "velocity_turn": 0.0, "other_axes": 0.0},
+        {"roll": 0.0, "pitch": 0.0, "velocity_turn": 6.0, "other_axes": 0.0},
     ),
     confusable={
         "vane_offset": "sight the vane's mark along the keel",

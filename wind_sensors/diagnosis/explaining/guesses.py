@@ -33,12 +33,15 @@ JET_SPREADS = ((0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25))
 """Induced velocity [m/s] of rotors and shares of it that blow forward and to the left, to begin
 with: a small jet from above moves nothing that turns about an upright axis."""
 
-BLIND_EFFECTS = frozenset({"axis_tilt", "clock_drift", "bearing_friction", "rotor_downwash"})
+BLIND_EFFECTS = frozenset(
+    {"axis_tilt", "clock_drift", "bearing_friction", "rotor_downwash", "frame_error"}
+)
 """Effects that are tried whether or not the screening sees them."""
 
-BLIND_IN_PARTS = (BLIND_EFFECTS - {"clock_drift"}) | {"potentiometer_gap"}
+BLIND_IN_PARTS = (BLIND_EFFECTS - {"clock_drift", "frame_error"}) | {"potentiometer_gap"}
 """Effects that are tried in the minutes in which others are seen: the blind ones but a clock that
-drifted, which stays wrong, and a gap that the wind crosses on its way through other directions."""
+drifted and axes that were mistaken, which stay wrong, and a gap that the wind crosses on its way
+through other directions."""
 
 DRIFTS = (-4000.0, -2000.0, -1000.0, 1000.0, 2000.0, 4000.0)
 """Drifts of a clock [ppm] to begin with: past a lag of a second or two the signals have lost each
@@ -101,6 +104,10 @@ def guesses_of(comparison: Comparison, station: Station) -> Guesses:
             for forward, leftward in JET_SPREADS
         ]
         out[jets[0].key] = jets
+        others = suggested(
+            "frame_error", PLATFORM, roll=0.0, pitch=0.0, velocity_turn=0.0, other_axes=1.0
+        )
+        out[others.key] = [others]
     clocks = [channel.instrument for channel in comparison.channels]
     for instrument in [*clocks, STATION]:
         drifts = [suggested("clock_drift", instrument, drift=drift) for drift in DRIFTS]
