@@ -43,7 +43,7 @@ def run(
 
 
 def same(a: Estimates, b: Estimates) -> bool:
-    return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(a, b, strict=True))
 
 
 def delayed(stream: list[Message], longest: float, seed: int) -> list[Message]:

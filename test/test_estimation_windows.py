@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -70,6 +71,32 @@ def test_the_corrected_mean_is_closer_to_the_truth_than_the_raw_one() -> None:
     assert abs(window.scalar_mean - true_speed) < 3.0 * window.scalar_mean_uncertainty
     predicted = window.bias_terms["u"].value
     assert raw == pytest.approx(predicted, abs=0.6 * raw)
+
+
+@pytest.mark.parametrize(("speed", "pulses"), [(4.0, 4), (8.0, 12)])
+def test_the_overspeeding_told_is_what_the_true_wind_does_to_the_rotor(
+    speed: float, pulses: int
+) -> None:
+    """K14 (75) with the moments of the true wind and of a rotor that turns in it."""
+    length = 1.7
+    station = mast({"mu2": 0.0, "pulses_per_revolution": pulses, "starting_speed": 0.0})
+    recording = blown(station, speed=speed, duration=300.0, intensity=0.1, sample_rate=100.0)
+    (window,) = process(recording, EstimatorSettings(window=300.0)).windows
+    truth = recording.truth
+    assert truth is not None
+    step = float(np.diff(truth.time)[0]) * 1e-9
+    wind = np.hypot(truth.velocity[:, 0], truth.velocity[:, 1])
+    rate = wind.copy()
+    for k, (before, after) in enumerate(pairwise(wind.tolist())):
+        # The exact solution for a wind that rises evenly, at its mean pace.
+        time = 2.0 * length / (before + after)
+        slope = (after - before) / step * time
+        rate[k + 1] = after - slope + (rate[k] - before + slope) * np.exp(-step / time)
+    expected = np.cov(wind - rate, wind)[0, 1] / wind.mean() ** 2
+    told = window.bias_terms["u"]
+    assert expected > 1e-4
+    assert told.value == pytest.approx(expected, rel=0.15)
+    assert told.uncertainty < 0.25 * told.value
 
 
 def test_the_wind_run_is_counted_with_what_is_known_of_the_count_and_the_calibration() -> None:

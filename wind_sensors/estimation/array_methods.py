@@ -10,7 +10,13 @@ import numpy.typing as npt
 from wind_sensors.estimation.array_equation import FamilyEquation
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
 from wind_sensors.estimation.constants import array_axes, fixed_propellers_of
-from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
+from wind_sensors.estimation.core import (
+    Estimates,
+    SmallScales,
+    no_estimates,
+    not_known,
+    output_times,
+)
 from wind_sensors.estimation.forward import AIR_DENSITY, AIR_TEMPERATURE, MOUNT_ROTATION
 from wind_sensors.estimation.history import RotorTrack
 from wind_sensors.estimation.intake import Block
@@ -51,7 +57,7 @@ def array_estimates(
     covariance = variance[:, np.newaxis, np.newaxis] * np.eye(3)
     return Estimates(
         times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, covariance,
-        to_earth,
+        to_earth, not_known(times.size),
     )
 
 

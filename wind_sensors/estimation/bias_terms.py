@@ -19,9 +19,9 @@ from wind_sensors.turbulence.inertial_range import (
     one_sided_longitudinal_constant,
 )
 
-_OVERSPEEDING_UNCERTAINTY = 0.5
-"""Relative, of `u`: the level that a filter finds at the scales of a rotor is too low, by up to a
-half where pulses are few."""
+_MOMENTS_UNCERTAINTY = 0.15
+"""Relative, of `u` from the moments of a smoothed state: 0.06 (largest 0.15) against a rotor in a
+known wind, and 0.1 of a4."""
 _LEVEL_UNCERTAINTY = 0.2
 """Relative, of an inertial-range level and of a4 together."""
 _INFERRED_VERTICAL = 1.5
@@ -42,6 +42,8 @@ class WindowTurbulence(NamedTuple):
         vertical_variance: [m^2/s^2].
         vertical_is_measured: Whether it was measured, not inferred.
         small_scales: Inertial range.
+        unfollowed: What the rotor did not follow, (<A'^2> - <y' A'>)/<A> [m/s]; nan where the
+            method does not know it.
     """
 
     speed: float
@@ -49,6 +51,7 @@ class WindowTurbulence(NamedTuple):
     vertical_variance: float
     vertical_is_measured: bool
     small_scales: SmallScales
+    unfollowed: float
 
 
 def dissipation(level: float, speed: float) -> float:
@@ -133,8 +136,10 @@ def predicted_terms(
             K94 (21) to (28).
 
     Returns:
-        u (overspeeding), v (speed against vector mean), w (angular response), vane_lag (what the
-        vane does not follow), translation (the propeller moves with the vane), arithmetic_mean.
+        u (overspeeding; K14 (75) where the method knows what the rotor did not follow, else the
+        inertial range, K14 (96)), v (speed against vector mean), w (angular response), vane_lag
+        (what the vane does not follow), translation (the propeller moves with the vane),
+        arithmetic_mean.
     """
     speed = max(turbulence.speed, 0.1)
     p = rotor_parameters(rotor)
@@ -144,6 +149,12 @@ def predicted_terms(
         rotor.distance_constant * rotor.inertia_factor, eps, speed, 0.0,
         turbulence.vertical_variance, p.a4, p.mu1, mu2,
     )
+    overspeeding = BiasTerm(local.u, _LEVEL_UNCERTAINTY * abs(local.u))
+    if math.isfinite(turbulence.unfollowed):
+        # A filter's level of the small scales is no measure of this: they share the frequencies
+        # above a rotor's response with the errors that it allows its equations.
+        found = p.a4 * turbulence.unfollowed / p.calibration_gain / speed
+        overspeeding = BiasTerm(found, _MOMENTS_UNCERTAINTY * abs(found))
     vertical = _MEASURED_VERTICAL if turbulence.vertical_is_measured else _INFERRED_VERTICAL
     across = dissipation(0.75 * turbulence.small_scales.across, speed)
     translation = 0.0
@@ -156,7 +167,7 @@ def predicted_terms(
     else:
         lag = 0.5 * vane_loss(vane, turbulence) / speed**2
     return {
-        "u": BiasTerm(local.u, _OVERSPEEDING_UNCERTAINTY * abs(local.u)),
+        "u": overspeeding,
         "v": _excess_of_scalar_mean(turbulence),
         "w": BiasTerm(local.w, vertical * abs(local.w)),
         "vane_lag": BiasTerm(lag, _LEVEL_UNCERTAINTY * abs(lag)),

@@ -24,6 +24,9 @@ class Estimates(NamedTuple):
         apparent: Sensor frame [m/s], shape (n, 3).
         apparent_covariance: [m^2/s^2], shape (n, 3, 3).
         to_earth: Matrices that turn the sensor's axes into ENU, shape (n, 3, 3).
+        unfollowed: Of the first rotor: forcing A, A - y [m/s] and the covariance of both at that
+            instant [m^2/s^2], shape (n, 3); nan where the method does not know the rotor's rate
+            apart from the wind, or the rotor stands still.
     """
 
     time: TimeArray
@@ -32,6 +35,7 @@ class Estimates(NamedTuple):
     apparent: FloatArray
     apparent_covariance: FloatArray
     to_earth: FloatArray
+    unfollowed: FloatArray
 
 
 class SmallScales(NamedTuple):
@@ -70,7 +74,13 @@ def no_estimates() -> Estimates:
         np.empty((0, 3)),
         np.empty((0, 3, 3)),
         np.empty((0, 3, 3)),
+        np.empty((0, 3)),
     )
+
+
+def not_known(count: int) -> FloatArray:
+    """`Estimates.unfollowed` of a method that does not know it."""
+    return np.full((count, 3), np.nan)
 
 
 def part_of(estimates: Estimates, where: slice | npt.NDArray[np.bool_]) -> Estimates:
@@ -82,6 +92,7 @@ def part_of(estimates: Estimates, where: slice | npt.NDArray[np.bool_]) -> Estim
         estimates.apparent[where],
         estimates.apparent_covariance[where],
         estimates.to_earth[where],
+        estimates.unfollowed[where],
     )
 
 

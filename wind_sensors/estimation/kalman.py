@@ -56,6 +56,7 @@ from wind_sensors.estimation.turbulence_process import (
     WIND_STATES,
 )
 from wind_sensors.estimation.turn_counting import loses_edges
+from wind_sensors.estimation.unfollowed import unfollowed_of
 from wind_sensors.estimation.wind_state import wind_of
 from wind_sensors.station.model import Cup, Propeller, Station
 
@@ -351,16 +352,22 @@ class KalmanCore:
         time = out.time[:filled].copy()
         rows = out.circumstances[:filled]
         velocity = out.states[:filled, :3].copy()
-        unresolved = self.filter.levels[[0, 2, VERTICAL_LEVEL]]
-        covariance = out.covariance[:filled, :3, :3] + UNRESOLVED_VARIANCE * np.diag(
-            [unresolved[:2].mean(), unresolved[:2].mean(), unresolved[2]]
+        level = float(self.filter.levels[[0, 2]].mean())
+        unresolved = UNRESOLVED_VARIANCE * np.array(
+            [level, level, self.filter.levels[VERTICAL_LEVEL]]
+        )
+        covariance = out.covariance[:filled, :3, :3] + np.diag(unresolved)
+        unfollowed = np.empty((filled, 3))
+        unfollowed_of(
+            self._instruments, out.states[:filled], out.covariance[:filled], rows,
+            float(unresolved[0]), unfollowed,
         )
         to_earth = rows[:, forward.MOUNT_ROTATION : forward.MOUNT_ROTATION + 9].reshape(-1, 3, 3)
         apparent = np.einsum("nji,nj->ni", to_earth, velocity - rows[:, :3])
         in_sensor = np.einsum("nji,njk,nkl->nil", to_earth, covariance, to_earth)
         estimates = Estimates(
             time, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor,
-            to_earth,
+            to_earth, unfollowed,
         )
         self.watch.take(estimates, out.states[:filled, 3 : 3 + 2 * len(self._rotors) : 2])
         parts = [

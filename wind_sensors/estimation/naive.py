@@ -6,7 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
-from wind_sensors.estimation.core import Estimates, SmallScales, no_estimates, output_times
+from wind_sensors.estimation.core import (
+    Estimates,
+    SmallScales,
+    no_estimates,
+    not_known,
+    output_times,
+)
 from wind_sensors.estimation.forward import MOUNT_ROTATION
 from wind_sensors.estimation.history import History
 from wind_sensors.estimation.intake import Block
@@ -63,7 +69,7 @@ def earth_estimates(
     covariance = np.einsum("nij,njk,nlk->nil", to_earth, in_sensor, to_earth)
     return Estimates(
         times, velocity, with_mount_covariance(covariance, velocity, rows), apparent, in_sensor,
-        to_earth,
+        to_earth, not_known(times.size),
     )
 
 

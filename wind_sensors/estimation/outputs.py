@@ -73,8 +73,9 @@ class WindowStatistics:
             [rad^2]. Like R it is weighted by wind run, not by time.
         turbulence: Standard deviations along, across and up [m/s], shape (3,).
         bias_terms: `u`, `v`, `w`, `vane_lag`, `translation`, `arithmetic_mean`: relative biases
-            of the raw reading, from inertial-range formulas that hold for distance constants much
-            smaller than the turbulence's integral length.
+            of the raw reading. The Kalman method takes `u` from the moments of its smoothed state;
+            its other terms, and those of other methods, are from inertial-range formulas that hold
+            for distance constants much smaller than the turbulence's integral length.
         instrument: Name of the rotor the run was counted with.
     """
 

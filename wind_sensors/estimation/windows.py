@@ -56,6 +56,8 @@ class _Sums:
     along: float = 0.0
     across: float = 0.0
     blocks: int = 0
+    turning: int = 0
+    unfollowed: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 class WindowAccumulator:
@@ -156,6 +158,11 @@ class WindowAccumulator:
         s.mount += (p - own).sum(axis=0)
         s.speed += float(np.sum(h + 0.5 * across / safe))
         s.pointing += (east.sum(), north.sum())
+        told = estimates.unfollowed[part]
+        told = told[np.isfinite(told[:, 0])]
+        s.turning += told.shape[0]
+        s.unfollowed += (told[:, 0].sum(), told[:, 1].sum(), (told[:, 0] * told[:, 1]).sum())
+        s.unfollowed[2] += told[:, 2].sum()
         if small is not None:
             s.along += small.along
             s.across += small.across
@@ -205,7 +212,7 @@ class WindowAccumulator:
         vector_speed = float(np.hypot(mean[0], mean[1]))
         state = WindowTurbulence(
             speed, vector_speed, float(fluctuation[2, 2]), self._vertical_is_measured,
-            SmallScales(s.along / blocks, s.across / blocks),
+            SmallScales(s.along / blocks, s.across / blocks), _unfollowed(s),
         )
         arithmetic = 0.0
         if run.turns and run.interval_turned > 0.0:
@@ -303,6 +310,14 @@ class WindowAccumulator:
         if not self._vertical_is_measured:
             mean_covariance[2, 2] = total[2, 2]
         return mean_covariance, bias_covariance
+
+
+def _unfollowed(s: _Sums) -> float:
+    """(<A'^2> - <y' A'>)/<A> of a window [m/s]; nan where no method told it."""
+    if s.turning == 0 or s.unfollowed[0] <= 0.0:
+        return _NO_NUMBER
+    forcing, lag, product = s.unfollowed / s.turning
+    return float((product - forcing * lag) / forcing)
 
 
 def _without_count(window: WindowStatistics) -> WindowStatistics:
