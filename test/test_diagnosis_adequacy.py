@@ -511,7 +511,7 @@ def test_a_fit_with_derivatives_carried_along_ends_where_an_exact_one_does() -> 
     )
 
 
-@pytest.mark.parametrize(("width", "possible"), [(12.0, True), (38.0, True), (40.0, False)])
+@pytest.mark.parametrize(("width", "possible"), [(12.0, True), (23.0, True), (25.0, False)])
 def test_a_wake_as_wide_as_the_search_allows_is_none(width: float, possible: bool) -> None:
     values = {"bearing_from": 200.0, "depth": 0.3, "width": width, "flank": 0.0}
     assert is_plausible(Term(catalogue()["wake_shadow"], "cup", values)) is possible

@@ -35,6 +35,8 @@ none, from the second on it is one; and by the same ratio more often than to any
 
 _FEW_RETURNS = 4.0
 _SAME_NUMBER = np.radians(0.001)
+_NOISY_NUMBER = np.radians(0.1)
+_NOISY_CELLS = 2
 
 _ERRATIC_REACH = 150_000_000
 _ERRATIC_TOGETHER = 300_000_000
@@ -92,22 +94,36 @@ def at_one_number(angles: Angles) -> FloatArray:
 
     A potentiometer's gap may read one end of its track. The vane comes back to that number again
     and again, and far less often to any other; one that sticks rests here and there, and coarse
-    readings share their returns.
+    readings share their returns. It is the same to the last digit, or within a converter's noise.
 
     Args:
         angles: Readings.
     """
-    number = np.rint(np.where(np.isfinite(angles.angle), angles.angle, np.inf) / _SAME_NUMBER)
+    told = np.where(np.isfinite(angles.angle), angles.angle, np.inf)
+    found = _returns_to_one(told, _SAME_NUMBER, 0)
+    return found if found.any() else _returns_to_one(told, _NOISY_NUMBER, _NOISY_CELLS)
+
+
+def _returns_to_one(angle: FloatArray, cell: float, beside: int) -> FloatArray:
+    """How far each reading is the number to which they return most often, shape (n,).
+
+    Args:
+        angle: Readings [rad], infinite where there is none.
+        cell: Width in which they count as one number [rad].
+        beside: Cells to either side that belong to the number as well.
+    """
+    number = np.rint(angle / cell)
     stays = np.flatnonzero(np.isfinite(number[1:]) & (number[1:] == number[:-1]))
     if stays.size < MANY_RETURNS[0]:
         return np.zeros(number.size)
     begins = stays[np.diff(stays, prepend=-2) > 1]
     numbers, returns = np.unique(number[begins], return_counts=True)
     most = int(np.argmax(returns))
-    other = max(float(np.max(np.delete(returns, most), initial=0)), _FEW_RETURNS)
+    apart = np.abs(numbers - numbers[most]) > beside
+    other = max(float(np.max(returns[apart], initial=0)), _FEW_RETURNS)
     least, sure = (count / _FEW_RETURNS for count in MANY_RETURNS)
     share = np.clip((returns[most] / other - least) / (sure - least), 0.0, 1.0)
-    return np.where(number == numbers[most], float(share), 0.0)
+    return np.where(np.abs(number - numbers[most]) <= beside, float(share), 0.0)
 
 
 def erratic_readings(angles: Angles, least: float = ERRATIC_STEP) -> BoolArray:

@@ -150,6 +150,8 @@ class Effect:
         needs: Data without which it cannot be seen.
         tie: From values in proportion to the templates', those that act alike where what may be
             `tied` is; None: nothing may be.
+        largest: Size, in those units, that nothing of the kind exceeds: what does is something
+            else.
         size: From the values, size in units of the smallest size worth reporting; None takes
             the largest departure over the parameters' `minimum`.
     """
@@ -195,6 +197,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     tie: Callable[[Values], dict[str, float]] | None = None
     size: Callable[[Values], float] | None = None
+    largest: float = math.inf
 
     def __reduce__(self) -> tuple[Callable[[str], Effect], tuple[str]]:
         """Effects travel between processes by their name."""

@@ -36,6 +36,10 @@ def _shadow(entry: Entry, values: Values) -> dict[str, Any]:
     return {"wake_shadows": (*entry.wake_shadows, shadow)}
 
 
+WIDEST_WAKE = 25.0
+"""Bound of a wake's width [deg]: a lobe of a flow past a mast, which comes twice in a circle, is as
+wide as this or wider."""
+
 WAKE_SHADOW = Effect(
     name="wake_shadow",
     meaning="The wind from one bearing reaches the rotor through the wake of an obstacle.",
@@ -51,7 +55,7 @@ WAKE_SHADOW = Effect(
     parameters=(
         Parameter("bearing_from", "deg", -720.0, 720.0, healthy=None, step=1.0, wraps=360.0),
         Parameter("depth", "1", 0.0, 0.95, minimum=0.05),
-        Parameter("width", "deg", 3.0, 40.0, healthy=None, step=0.5),
+        Parameter("width", "deg", 3.0, WIDEST_WAKE, healthy=None, step=0.5),
         Parameter("flank", "1", -0.1, 0.3, step=0.01),
     ),
     applies=_is_rotor,
@@ -84,6 +88,10 @@ def _distortion(entry: Entry, values: Values) -> dict[str, Any]:
 _DIRECTIONS = np.radians(np.arange(0.0, 360.0, 5.0))
 
 
+SMALLEST_DISTORTION = 0.02
+"""Change of the speed in some direction that is worth reporting."""
+
+
 def _distortion_size(values: Values) -> float:
     change = (
         values["cosine_1"] * np.cos(_DIRECTIONS)
@@ -91,7 +99,7 @@ def _distortion_size(values: Values) -> float:
         + values["cosine_2"] * np.cos(2.0 * _DIRECTIONS)
         + values["sine_2"] * np.sin(2.0 * _DIRECTIONS)
     )
-    return float(np.abs(change).max()) / 0.02
+    return float(np.abs(change).max()) / SMALLEST_DISTORTION
 
 
 _HARMONICS = ("cosine_1", "sine_1", "cosine_2", "sine_2")
@@ -106,7 +114,7 @@ FLOW_DISTORTION = Effect(
     region="all directions, smoothly",
     standing=0.06,
     parameters=(
-        *(Parameter(name, "1", -0.3, 0.3, minimum=0.02) for name in _HARMONICS),
+        *(Parameter(name, "1", -0.3, 0.3, minimum=SMALLEST_DISTORTION) for name in _HARMONICS),
         Parameter("deflection", "1", -1.5, 1.5, healthy=None, step=0.2, starts=(0.0,)),
     ),
     applies=lambda entry, station: isinstance(entry, Rotor | Angle),
@@ -124,6 +132,9 @@ FLOW_DISTORTION = Effect(
     },
     needs=("a wind that turns by some 60 degrees",),
     size=_distortion_size,
+    # Potential flow past a cylinder, one radius off its surface, changes the speed by a quarter.
+    # What a narrow sector shows may ask for more in directions that no wind came from.
+    largest=0.3 / SMALLEST_DISTORTION,
 )
 
 

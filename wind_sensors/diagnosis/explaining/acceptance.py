@@ -453,4 +453,5 @@ def is_plausible(term: Term, least: float = SMALLEST_SIZE) -> bool:
         term: The term.
         least: Size that it must have, in units of the smallest worth reporting.
     """
-    return large_enough(term, least) and not run_away(term)
+    possible = term.relative_size <= term.effect.largest and not run_away(term)
+    return possible and large_enough(term, least)

@@ -96,8 +96,12 @@ def _named(
                     searcher, *swapped(searcher, pair.whitener, both, newest), found.screened
                 )
                 return replace(settled, alone=found.alone)
-    broad = {t.effect.name for t in found.fit.terms if t.effect.everywhere}
-    if not broad or found.fit.active < BROAD_PARAMETERS:
+    leading = found.fit
+    if not leading.terms and first.led is not None:
+        # Fitted to the end, it asked for more than anything of its kind may be.
+        leading = first.led[0].fit
+    broad = {t.effect.name for t in leading.terms if t.effect.everywhere}
+    if not broad or leading.active < BROAD_PARAMETERS:
         return found
     everywhere = frozenset(n for n, e in searcher.effects.items() if e.everywhere)
     led = best_single(searcher, whitener, singles, everywhere)
@@ -105,7 +109,7 @@ def _named(
         searcher, lambda share: report(0.5 + 0.5 * share), replace(first, led=led), everywhere,
         beside,
     )
-    if narrow.fit.terms and _fits_better(searcher, narrow, found):
+    if not found.fit.terms or (narrow.fit.terms and _fits_better(searcher, narrow, found)):
         return narrow
     simpler = (
         0 < narrow.fit.active < found.fit.active

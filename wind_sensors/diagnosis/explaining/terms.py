@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,9 @@ from wind_sensors.station.model import Station
 
 Interval = tuple[float, float | None]
 ALWAYS: Interval = (0.0, None)
+
+HALFWAY = math.log(2.0)
+"""Time constants until what grows has half of its size: then a step would begin that fits it."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +49,18 @@ class Term:
 
     @property
     def growing(self) -> tuple[Term, ...]:
-        """The same, growing, where it is taken to begin at its full size: from there, or always."""
+        """The same, growing, where it is taken to begin at its full size.
+
+        It grows from there, from so much earlier that half of it has grown by then, or always.
+        """
         if self.grows or not self.effect.grows or self.interval == ALWAYS:
             return ()
         (parameter,) = (p for p in self.effect.parameters if p.name == self.effect.grows)
+        begin, end = self.interval
         return tuple(
             replace(self, values={**self.values, parameter.name: time}, interval=interval)
             for time in parameter.starts
-            for interval in (self.interval, ALWAYS)
+            for interval in (self.interval, (max(begin - HALFWAY * time, 0.0), end), ALWAYS)
         )
 
     @property

@@ -156,11 +156,15 @@ def _reading_guesses(comparison: Comparison, channel: Channel) -> list[Term]:
     hole = hole_between(degrees)
     if hole is not None:
         out.append(_gap(vane, *hole))
+    at_one = comparison.recording.angles[vane].at_one_number > 0.0
+    if at_one.any() and not 1 <= common.size <= 3:
+        # A converter's noise spreads the number.
+        common = np.median(np.degrees(delivered[at_one]), keepdims=True)
     if 1 <= common.size <= 3:
         low, high = float(common.min()), float(common.max())
         if common.size == 1:
             beside = [(low + 5.0 * side, 10.0) for side in (-1.0, 1.0)]
-            there = np.abs(np.degrees(delivered) - low) < SAME_VALUE
+            there = at_one | (np.abs(np.degrees(delivered) - low) < SAME_VALUE)
             told = _told_gap(comparison, channel, there, reading=low)
             if told:
                 return [*(t for t in out if t.effect.name != "potentiometer_gap"), *told]

@@ -159,7 +159,10 @@ def judgement_of(
     if findings:
         structured = located(naming, bank, comparison, baseline).is_structure
         objection = objection_to(
-            Claim(verdict, findings, naming, comparison, baseline.station, structured, workers)
+            Claim(
+                verdict, findings, naming, comparison, baseline.station, structured,
+                baseline.calibrated, workers,
+            )
         )
     proving(1.0)
     if objection is not None:

@@ -41,6 +41,7 @@ from wind_sensors.diagnosis.proving.remainder import (
 from wind_sensors.diagnosis.proving.support import (
     UNSEEN_NOISY_GAIN,
     borne_out,
+    clearly_borne_out,
     determined,
     made_up,
     passes_unseen,
@@ -228,6 +229,7 @@ class Claim:
         comparison: The recording.
         station: As commissioned.
         structured: Whether the recording shows, without any effect, more than healthy ones do.
+        calibrated: Whether healthy recordings tell what is normal for the station.
         workers: Processes.
     """
 
@@ -237,6 +239,7 @@ class Claim:
     comparison: Comparison
     station: Station
     structured: bool
+    calibrated: bool
     workers: int
 
     @property
@@ -287,6 +290,16 @@ def _not_borne_out(claim: Claim) -> Objection | None:
         return None
     words = "blocks that were not fitted do not bear it out"
     return Objection(words, claim.withdrawn_unless_it_shows)
+
+
+def _may_be_normal(claim: Claim) -> Objection | None:
+    if claim.calibrated or clearly_borne_out(claim.findings):
+        return None
+    words = (
+        "blocks that were not fitted bear it out too little for a station of which no healthy "
+        "recording tells what is normal"
+    )
+    return Objection(words, "inconclusive")
 
 
 def _passes_unseen(claim: Claim) -> Objection | None:
@@ -361,6 +374,7 @@ def _of_any_size(claim: Claim) -> Objection | None:
 
 OBJECTIONS: tuple[Callable[[Claim], Objection | None], ...] = (
     _not_borne_out,
+    _may_be_normal,
     _passes_unseen,
     _made_up,
     _undo_each_other,
