@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,13 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from builtin_interfaces.msg import Time
 from nodes_harness import Graph, overrides
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.storage_mcap import McapWriter
-from std_msgs.msg import String
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header, String
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.player import PlayerNode
@@ -29,8 +33,10 @@ from wind_sensors.nodes.recorder import RecorderNode
 from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario_of
 from wind_sensors.recordings import load_station, read_recording, write_recording
 from wind_sensors.recordings.bag import read_bag
+from wind_sensors.recordings.serialising import template
 from wind_sensors.simulation.run import simulate
 from wind_sensors.station.signals import Recording
+from wind_sensors.station.writing import station_to_yaml
 
 SECONDS = 20.0
 
@@ -340,3 +346,165 @@ def test_a_publisher_that_comes_back_as_best_effort_is_recorded(
     recorder.close()
     raw = read_bag(tmp_path / "restarted" / "bag").topics["/text"].raw
     assert any(b"b" in message for message in raw)
+
+
+def _bag(folder: Path, topics: dict[str, str], times: Sequence[int]) -> Path:
+    """A bag of empty messages, one for each time on each topic, which comes with its type."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    types.register(get_types_from_msg("float64 speed", "boat_msgs/msg/Engine"))
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for name, message_type in topics.items():
+            connection = writer.add_connection(name, message_type, typestore=types)
+            raw = types.serialize_cdr(template(types, message_type), message_type)
+            for time_ns in times:
+                writer.write(connection, time_ns, bytes(raw))
+    return folder
+
+
+_HEADER = "std_msgs/msg/Header"
+_TWIST = "geometry_msgs/msg/TwistWithCovarianceStamped"
+_START = 1_700_000_000 * 10**9
+
+
+def _replayed(graph: Graph, tmp_path: Path, *arguments: str) -> str:
+    """What `wind replay` says."""
+    replay = _wind(graph.domain, tmp_path, "replay", *arguments, "--rate", "50")
+    output, _ = replay.communicate(timeout=60)
+    assert replay.returncode == 0, output
+    return " ".join(output.split())
+
+
+def test_what_comes_before_simulated_time_is_recorded_at_its_beginning(
+    graph: Graph, tmp_path: Path
+) -> None:
+    target = tmp_path / "early"
+    recorder = graph.add(
+        RecorderNode, folder=target, topics=["/text"],
+        parameter_overrides=overrides(use_sim_time=True),
+    )
+    sender = graph.listener()
+    texts = sender.create_publisher(String, "/text", output_quality())
+    clock = sender.create_publisher(Clock, "/clock", output_quality())
+    graph.spin(lambda: texts.get_subscription_count() == 1 == clock.get_subscription_count())
+    for text in ("first", "second"):
+        texts.publish(String(data=text))
+    graph.spin(lambda: recorder.counts["/text"] == 2)
+    assert recorder.waits_for_clock
+    graph.spin(lambda: recorder.get_clock().now().nanoseconds > 0 or clock.publish(_clock(5)))
+    texts.publish(String(data="third"))
+    graph.spin(lambda: recorder.counts["/text"] == 3)
+    recorder.close()
+    found = read_bag(target / "bag").topics["/text"]
+    assert len(found.raw) == 3
+    assert set(found.log_time) == {5 * 10**9}
+    for sent, raw in zip((b"first", b"second", b"third"), found.raw, strict=True):
+        assert sent in raw
+    assert "2 messages" in recorder.notes["/clock"]
+
+
+def _clock(seconds: int) -> Clock:
+    return Clock(clock=Time(sec=seconds))
+
+
+def test_without_a_clock_what_came_is_recorded_at_wall_time(graph: Graph, tmp_path: Path) -> None:
+    target = tmp_path / "timeless"
+    recorder = graph.add(
+        RecorderNode, folder=target, topics=["/text"],
+        parameter_overrides=overrides(use_sim_time=True),
+    )
+    texts = graph.listener().create_publisher(String, "/text", output_quality())
+    graph.spin(lambda: texts.get_subscription_count() == 1)
+    begin = time.time_ns()
+    texts.publish(String(data="only"))
+    graph.spin(lambda: recorder.counts["/text"] == 1)
+    recorder.close()
+    (at,) = read_bag(target / "bag").topics["/text"].log_time
+    assert begin <= at <= time.time_ns()
+    assert "no /clock came" in recorder.notes["/clock"]
+
+
+def test_messages_at_time_nought_and_years_without_any_keep_nobody_waiting(
+    graph: Graph, tmp_path: Path
+) -> None:
+    second = 10**9
+    year = 365 * 86_400 * second
+    times = [0, 0, _START, _START + second, _START + year, _START + year + second]
+    content = read_bag(_bag(tmp_path / "odd", {"/pulses": _HEADER}, times))
+    player = graph.add(PlayerNode, content=content, rate=50.0, wait_for_subscribers=1)
+    listener = graph.listener()
+    clock = graph.listen(listener, Clock, "/clock")
+    graph.spin(lambda: player.count_subscribers("/clock") == 1)
+    graph.listen(listener, Header, "/pulses")
+    graph.spin(lambda: player.finished and len(clock) > 0)
+    assert player.published == len(times)
+    assert player.duration == 2.0
+    told = [message.clock.sec * second + message.clock.nanosec for message in clock]
+    assert told == sorted(told)
+    assert told[0] >= _START
+    assert "2 messages were recorded at time 0" in player.notes[0]
+    assert "8760.0 hours" in player.notes[1]
+
+
+def test_inputs_only_are_the_topics_of_the_station_file(graph: Graph, tmp_path: Path) -> None:
+    folder = tmp_path / "boat"
+    text = station_to_yaml(load_station("usv")).replace(" /wind/cup/", " /wind/cup/")
+    topics = {
+        "/wind/cup/pulses": _HEADER,
+        "/tf_static": "std_msgs/msg/String",  # where tf2 is not installed, too
+        "/wind": _TWIST,
+        "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+        "/truth/wind": "geometry_msgs/msg/Vector3Stamped",
+    }
+    folder.mkdir()
+    (folder / "recording.yaml").write_text(text, encoding="utf-8")
+    _bag(folder / "bag", topics, [_START])
+    assert "Published 2 messages" in _replayed(graph, tmp_path, str(folder), "--inputs-only")
+    assert "Published 2 messages" in _replayed(graph, tmp_path, f"{folder}/bag", "--inputs-only")
+
+
+def test_inputs_only_of_a_bag_alone_leave_out_what_an_estimator_publishes(
+    graph: Graph, tmp_path: Path
+) -> None:
+    kept = {
+        "/wind/cup/pulses": _HEADER,
+        "/sonic/wind": "geometry_msgs/msg/Vector3Stamped",
+        "/headwind": _TWIST,
+    }
+    left_out = {
+        "/wind": _TWIST,
+        "/a/wind": _TWIST,
+        "/a/wind/bias/vane_lag": "std_msgs/msg/Float64",
+        "/a/b/wind/nmea": "std_msgs/msg/String",
+        "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    }
+    bag = _bag(tmp_path / "bag", kept | left_out, [_START])
+    output = _replayed(graph, tmp_path, str(bag), "--inputs-only")
+    assert f"Published {len(kept)} messages" in output
+
+
+def test_a_type_that_is_not_installed_costs_its_own_topic_alone(
+    graph: Graph, tmp_path: Path
+) -> None:
+    topics = {"/cup/pulses": _HEADER, "/engine": "boat_msgs/msg/Engine"}
+    content = read_bag(_bag(tmp_path / "bag", topics, [_START]))
+    player = graph.add(PlayerNode, content=content)
+    graph.spin(lambda: player.finished)
+    assert player.published == 1
+    (note,) = player.notes
+    assert note.startswith("/engine is left out")
+    assert "boat_msgs" in note
+    assert "station file" not in note
+    with pytest.raises(UserError, match="boat_msgs"):
+        graph.add(PlayerNode, content=content, topics=list(topics))
+
+
+def test_topics_to_replay_may_be_relative_and_misspelt_ones_are_told(
+    graph: Graph, tmp_path: Path
+) -> None:
+    bag = _bag(tmp_path / "bag", {"/cup/pulses": _HEADER, "/a/vane": _HEADER}, [_START])
+    output = _replayed(graph, tmp_path, str(bag), "--topics", "cup/pulses", "/cup/pulse")
+    assert "Published 1 messages" in output
+    assert "/cup/pulse is not in the bag: did you mean /cup/pulses?" in output
+    player = graph.add(PlayerNode, content=read_bag(bag), topics=["vane"], namespace="/a")
+    graph.spin(lambda: player.finished)
+    assert (player.published, player.notes) == (1, [])

@@ -54,18 +54,13 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.nodes import execution
     from wind_sensors.recordings import load_station
     from wind_sensors.recordings.writing import keep_inputs
-    from wind_sensors.station.topic_names import REMEDY, topic_name_fault
+    from wind_sensors.station.topic_names import refuse_other_texts
 
     if not (args.station or args.topics or args.all):
         raise UserError(
             "it is not said what to record.", remedy="Give --station FILE, --topics or --all."
         )
-    for topic in args.topics or ():
-        fault = topic_name_fault(topic)
-        if fault:
-            raise UserError(
-                f"'{topic}' is not a ROS 2 topic name: it {fault}.", "--topics", REMEDY
-            )
+    refuse_other_texts(args.topics or (), "--topics")
     keep_inputs(args.output, (args.station,))
     station = load_station(args.station) if args.station else None
     made: list[RecorderNode] = []
@@ -99,7 +94,9 @@ def run(args: argparse.Namespace) -> int:
         def until() -> bool:
             counts = made[0].counts
             messages = sum(counts.values())
-            progress.update(task, description=f"{messages} messages of {len(counts)} topics")
+            waiting = ", waiting for /clock" if made[0].waits_for_clock else ""
+            text = f"{messages} messages of {len(counts)} topics{waiting}"
+            progress.update(task, description=text)
             return args.duration is not None and time.monotonic() - begin >= args.duration
 
         execution.run(build, ros_arguments(args), until=until)

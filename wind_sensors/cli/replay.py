@@ -14,6 +14,7 @@ from wind_sensors.cli.screen import screen
 
 if TYPE_CHECKING:
     from wind_sensors.nodes.player import PlayerNode
+    from wind_sensors.recordings.bag import BagContent
 
 
 def register(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -27,11 +28,18 @@ def register(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("recording", metavar="RECORDING", help="recording folder, or a bag")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="X", help="X times as fast")
     parser.add_argument("--loop", action="store_true", help="start again at the end")
-    parser.add_argument("--topics", nargs="+", metavar="TOPIC", help="these topics alone")
-    parser.add_argument(
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--topics",
+        nargs="+",
+        metavar="TOPIC",
+        help="these topics (default: all whose message types are installed)",
+    )
+    which.add_argument(
         "--inputs-only",
         action="store_true",
-        help="leave out the wind and diagnostics that an estimator had published",
+        help="the inputs of the recording's station, /tf and /tf_static; of a bag without a "
+        "station file all but what an estimator had published",
     )
     parser.add_argument(
         "--no-clock", dest="clock", action="store_false", help="do not publish /clock"
@@ -53,7 +61,9 @@ def run(args: argparse.Namespace) -> int:
     from wind_sensors.nodes import execution
     from wind_sensors.recordings.bag import read_bag
     from wind_sensors.recordings.reading import BAG_FOLDER
+    from wind_sensors.station.topic_names import refuse_other_texts
 
+    refuse_other_texts(args.topics or (), "--topics")
     folder = Path(args.recording)
     if not folder.exists():
         raise UserError("there is no such recording.", str(folder), "Check the path.")
@@ -61,29 +71,25 @@ def run(args: argparse.Namespace) -> int:
     console = screen()
     for note in content.notes:
         console.print(f"note: {note}")
-    topics = args.topics
-    if args.inputs_only:
-        outputs = ("/wind", "/diagnostics")
-        topics = [
-            name
-            for name in (topics or content.topics)
-            if not any(name == o or name.startswith(f"{o}/") for o in outputs)
-        ]
     made: list[PlayerNode] = []
 
     def build() -> list[PlayerNode]:
         from wind_sensors.nodes.player import PlayerNode
 
+        if args.inputs_only:
+            _leave_inputs(content, folder)
         made.append(
             PlayerNode(
                 content,
-                topics,
+                args.topics,
                 rate=args.rate,
                 loop=args.loop,
                 with_clock=args.clock,
                 wait_for_subscribers=args.wait_for,
             )
         )
+        for note in made[0].notes:
+            console.print(f"note: {note}")
         return made
 
     columns = (
@@ -103,3 +109,16 @@ def run(args: argparse.Namespace) -> int:
     if made:
         console.print(f"Published {made[0].published} messages from {args.recording}.")
     return 0
+
+
+def _leave_inputs(content: BagContent, folder: Path) -> None:
+    """Take from a bag's content what is no input of its station, or what an estimator published."""
+    from wind_sensors.nodes.topics import TRANSFORM_TOPICS, is_output
+    from wind_sensors.recordings import load_station
+    from wind_sensors.recordings.reading import STATION_FILE, home_of, station_topics
+
+    file = home_of(folder) / STATION_FILE
+    inputs = station_topics(load_station(file)) | TRANSFORM_TOPICS if file.exists() else None
+    for name, data in list(content.topics.items()):
+        if is_output(name, data.message_type) if inputs is None else name not in inputs:
+            del content.topics[name]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -47,6 +48,9 @@ _OFFERS_PERIOD = 0.25
 _PUT_DOWN_PERIOD = 1.0
 """A killed recorder loses what came in so many seconds."""
 
+_MOST_HELD = 64 * 1024 * 1024
+"""Room for what comes before simulated time runs [bytes]."""
+
 _NOT_SIGNALS = frozenset({"/clock", "/rosout", "/parameter_events"})
 
 
@@ -67,13 +71,28 @@ class _Heard:
     subscriptions: list[Subscription] = field(default_factory=list)
 
 
+class _Held(NamedTuple):
+    """A message that came before simulated time ran.
+
+    Attributes:
+        connection: Its topic.
+        wall_time: When it came [ns since 1970].
+        message: Serialised.
+    """
+
+    connection: Connection
+    wall_time: int
+    message: bytes
+
+
 class RecorderNode(Node):
     """Writes the messages of some topics, or of all, to a recording.
 
     A topic is subscribed to when its first publisher is seen, with as much reliability and
     durability as all its publishers offer, so that latched messages come too. Where a publisher
     comes later that offers less, the topic is subscribed to again. The time of recording is the
-    node's clock. A recorder that is killed loses the last second.
+    node's clock. A recorder that is killed loses the last second. What comes on simulated time
+    before the first /clock is held back until then, since it has no time to be recorded at.
 
     Args:
         folder: The recording to write; must not exist unless `force`.
@@ -110,6 +129,9 @@ class RecorderNode(Node):
         self.refused: dict[str, str] = {}
         self.notes: dict[str, str] = {}
         self._heard: dict[str, _Heard] = {}
+        self._held: list[_Held] = []
+        self._room = _MOST_HELD
+        self._without_room = 0
         self._depth = depth
         self._wanted = (
             None if topics is None else {self.resolve_topic_name(topic): topic for topic in topics}
@@ -127,7 +149,7 @@ class RecorderNode(Node):
             for period, task in (
                 (_DISCOVERY_PERIOD, self.discover),
                 (_OFFERS_PERIOD, self._adapt),
-                (_PUT_DOWN_PERIOD, self._bag.put_down),
+                (_PUT_DOWN_PERIOD, self._put_down),
             )
         ]
 
@@ -145,6 +167,11 @@ class RecorderNode(Node):
         """Topics, as they were given, that nobody publishes yet."""
         seen = set(self.counts) | set(self.refused)
         return [name for topic, name in (self._wanted or {}).items() if topic not in seen]
+
+    @property
+    def waits_for_clock(self) -> bool:
+        """Whether messages are held back because simulated time does not run yet."""
+        return bool(self._held)
 
     def _subscribe(self, topic: str, types: Sequence[str]) -> None:
         (message_type, *others) = types
@@ -209,17 +236,60 @@ class RecorderNode(Node):
             heard.request = request
 
     def _keeper(self, topic: str, connection: Connection) -> Callable[[bytes], None]:
-        clock = self.get_clock()
-
         def keep(message: bytes) -> None:
-            if self._bag.is_open:
-                self.counts[topic] += 1
-                self._bag.write(connection, clock.now().nanoseconds, message)
+            if not self._bag.is_open:
+                return
+            now = self._now()
+            if now == 0:
+                self._hold(topic, connection, message)
+                return
+            self._release(now)
+            self.counts[topic] += 1
+            self._bag.write(connection, now, message)
 
         return keep
 
+    def _now(self) -> int:
+        """The node's clock [ns]; 0 on simulated time that does not run yet."""
+        return int(self.get_clock().now().nanoseconds)
+
+    def _hold(self, topic: str, connection: Connection, message: bytes) -> None:
+        """Keep a message for the first /clock, the first ones where there is no room for all."""
+        if len(message) > self._room:
+            self._without_room += 1
+            return
+        self._room -= len(message)
+        self.counts[topic] += 1
+        self._held.append(_Held(connection, time.time_ns(), message))
+
+    def _release(self, now: int | None) -> None:
+        """Record what was held back.
+
+        Args:
+            now: The first simulated time [ns]; None: there was none, so wall time has to do.
+        """
+        if not self._held:
+            return
+        at = "at the first simulated time" if now is not None else "at wall time: no /clock came"
+        note = f"{len(self._held)} messages came before it and were recorded {at}"
+        if self._without_room:
+            note += f"; there was no room for {self._without_room} more, which are lost"
+        self.notes["/clock"] = note
+        self.get_logger().warning(f"/clock: {note}.")
+        held, self._held = self._held, []
+        for connection, wall_time, message in held:
+            self._bag.write(connection, wall_time if now is None else now, message)
+
+    def _put_down(self) -> None:
+        now = self._now()
+        if now:
+            self._release(now)
+        self._bag.put_down()
+
     def close(self) -> None:
         """Finish the bag; later messages are ignored."""
+        if self._bag.is_open:
+            self._release(self._now() or None)
         self._bag.close()
 
     def destroy_node(self) -> None:

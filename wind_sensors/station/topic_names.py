@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+
+from wind_sensors.errors import UserError
 
 LONGEST_NAME = 247
 """Characters that the middleware has room for."""
@@ -45,3 +48,19 @@ def topic_name_fault(name: str) -> str:
     if digit is not None:
         return f"has a part that begins with a digit ('{digit[1]}')"
     return ""
+
+
+def refuse_other_texts(names: Iterable[str], where: str) -> None:
+    """Check that texts name topics.
+
+    Args:
+        names: Absolute, relative or private names.
+        where: For the message.
+
+    Raises:
+        UserError: One does not; tells why.
+    """
+    for name in names:
+        fault = topic_name_fault(name)
+        if fault:
+            raise UserError(f"'{name}' is not a ROS 2 topic name: it {fault}.", where, REMEDY)
