@@ -169,6 +169,36 @@ def test_mistakes_end_with_status_two_and_a_sentence(
     assert "Traceback" not in errors
 
 
+_TWO_NODES = """
+import sys
+from wind_sensors.nodes.execution import run
+
+def build():
+    from rclpy.node import Node
+
+    first, second = Node("first"), Node("second")
+    first.declare_parameter("window", 1.0)
+    second.declare_parameter("rate", 1.0)
+    return [first, second]
+
+sys.exit(run(build, sys.argv[1:], until=lambda: True))
+"""
+
+
+def test_a_parameter_that_no_node_of_the_process_knows_is_told_once(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters: {widnow: 5.0, window: 5.0, rate: 2.0, use_sim_time: false}\n",
+        encoding="utf-8",
+    )
+    process = _run(_TWO_NODES, tmp_path, "--ros-args", "--params-file", str(file))
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    told = [line for line in (output + errors).splitlines() if "is not known" in line]
+    assert len(told) == 1
+    assert "'widnow'" in told[0] and "did you mean 'window'?" in told[0]
+
+
 STOPPED_WITHIN_A_DESTRUCTOR = """
 import os, signal
 from wind_sensors.nodes.execution import run

@@ -11,13 +11,13 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from diagnostic_msgs.msg import DiagnosticArray
 from nodes_harness import Graph, overrides, status, values
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.qos import QoSReliabilityPolicy
+from rclpy.qos import QoSDurabilityPolicy, QoSReliabilityPolicy
 from std_msgs.msg import String
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.estimator_node import EstimatorNode
 from wind_sensors.nodes.kinds import BIVANE, CUP_VANE, PROPELLER_VANE
-from wind_sensors.nodes.parameters import Parameter
+from wind_sensors.nodes.parameters import Parameter, unknown_parameters
 from wind_sensors.nodes.simulator import SimulatorNode
 
 
@@ -51,10 +51,13 @@ def test_changes_at_run_time_take_effect_or_say_why_not(graph: Graph) -> None:
         ({"input_depth": 5}, "read-only"),
         ({"cup.pulses.topic": "/elsewhere"}, "read-only"),
         ({"nmea_talker": 7}, "text"),
+        ({"cup.calibration_distance": None}, "cannot be unset"),
+        ({"output_rate": None}, "cannot be unset"),
     ):
         result = _set(node, **change)
         assert not result.successful
         assert reason in result.reason
+    assert _set(node, **{"cup.calibration_distance": 0.24}).successful
     assert node.station.instrument("cup").distance_constant == 1.7
 
 
@@ -82,6 +85,41 @@ def test_parameters_alone_make_a_station(graph: Graph) -> None:
     assert node.topics == {"/cup/pulses", "/vane/joint_states"}
 
 
+def test_a_word_that_ros_reads_as_a_boolean_is_the_word(graph: Graph) -> None:
+    node = _estimator(graph, station="usv", **{"platform.heading_reference": True})
+    assert node.station.platform.heading_reference == "true"
+    assert _set(node, **{"platform.heading_reference": "magnetic"}).successful
+    assert _set(node, **{"platform.heading_reference": True}).successful
+    assert node.station.platform.heading_reference == "true"
+    assert not _set(node, **{"platform.heading_reference": False}).successful
+
+
+def test_parameters_that_nobody_knows_are_told_with_what_may_be_meant(graph: Graph) -> None:
+    diagnostics = graph.listen(graph.listener(), DiagnosticArray, "/diagnostics")
+    node = _estimator(
+        graph,
+        widnow=5.0,
+        **{
+            "diagnostics_period": 0.05,
+            "cup.calibraton_distance": 0.2,
+            "qos_overrides./elsewhere.subscription.depth": 5,
+        },
+    )
+    nearest = {"widnow": "window", "cup.calibraton_distance": "cup.calibration_distance"}
+    assert unknown_parameters(node) == nearest
+    graph.spin(lambda: status(diagnostics, "settings") is not None)
+    found = status(diagnostics, "settings")
+    assert found.level == b"\x01"
+    assert "'widnow' is not known and has no effect: did you mean 'window'?" in found.message
+
+
+def test_what_is_meant_for_a_peer_is_not_unknown(graph: Graph) -> None:
+    node = _estimator(graph, mean_speed=5.0)
+    assert unknown_parameters(node) == {"mean_speed": ""}
+    peer = graph.add(SimulatorNode)
+    assert unknown_parameters(node, [peer]) == {}
+
+
 def test_a_missing_constant_is_named(graph: Graph) -> None:
     with pytest.raises(UserError, match="damping_ratio"):
         _estimator(graph, station="", **{"cup.profile": "risoe_cup"})
@@ -95,12 +133,18 @@ def test_a_node_refuses_a_station_without_its_instrument(graph: Graph, kind: Any
 
 def test_raw_inputs_are_best_effort_and_outputs_reliable_unless_overridden(graph: Graph) -> None:
     node = _estimator(
-        graph, **{"qos_overrides./vane/joint_states.subscription.reliability": "reliable"}
+        graph,
+        **{
+            "qos_overrides./vane/joint_states.subscription.reliability": "reliable",
+            "qos_overrides./vane/joint_states.subscription.durability": "transient_local",
+        },
     )
     (pulses,) = node.get_subscriptions_info_by_topic("/cup/pulses")
+    assert pulses.qos_profile.durability == QoSDurabilityPolicy.VOLATILE
     assert pulses.qos_profile.reliability == QoSReliabilityPolicy.BEST_EFFORT
     (angles,) = node.get_subscriptions_info_by_topic("/vane/joint_states")
     assert angles.qos_profile.reliability == QoSReliabilityPolicy.RELIABLE
+    assert angles.qos_profile.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL
     (wind,) = node.get_publishers_info_by_topic("/wind")
     assert wind.qos_profile.reliability == QoSReliabilityPolicy.RELIABLE
     assert node.get_parameter("qos_overrides./wind.publisher.depth").value == 10

@@ -120,6 +120,20 @@ def test_the_robot_recipe_names_every_requirement_once(declaration: dict[str, An
             assert bool(named) != (f"python3-{name}" in by_rosdep), requirement
 
 
+def test_rosdep_knows_the_ros_packages_that_are_imported_and_what_the_tests_need(
+    declaration: dict[str, Any],
+) -> None:
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    imported = {
+        name
+        for file in (ROOT / "wind_sensors").rglob("*.py")
+        for name in re.findall(r"^ *from (\w+)\.msg import", file.read_text("utf-8"), re.MULTILINE)
+    }
+    assert imported <= {d.text for d in package.iter("exec_depend")}
+    needed = [re.split("[><=]", name)[0] for name in declaration["extras_require"]["test"]]
+    assert {d.text for d in package.iter("test_depend")} == {f"python3-{name}" for name in needed}
+
+
 def test_every_configuration_is_installed(declaration: dict[str, Any]) -> None:
     installed = {name for _, names in declaration["data_files"] for name in names}
     shipped = {p.relative_to(ROOT).as_posix() for p in (ROOT / "config").rglob("*.yaml")}

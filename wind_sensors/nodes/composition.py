@@ -76,6 +76,7 @@ class Composition:
         self.simulator = SimulatorNode(
             parameter_overrides=_overrides({**common, **simulation, "wait_for_subscribers": waits})
         )
+        self.estimator.peers = (self.simulator,)
         self._finished_at: float | None = None
         self._flushed = False
 

@@ -29,7 +29,16 @@ from wind_sensors.nodes.estimator_parameters import NODE_PARAMETERS
 from wind_sensors.nodes.inputs import EstimatorInputs
 from wind_sensors.nodes.mounting import MountingFromTf, SensorPose, tf2_is_installed
 from wind_sensors.nodes.outputs import TOPICS, WindPublishers
-from wind_sensors.nodes.parameters import Parameter, Value, changed, declare, describe, number
+from wind_sensors.nodes.parameters import (
+    Parameter,
+    Value,
+    changed,
+    declare,
+    describe,
+    number,
+    unknown_parameters,
+    unknown_text,
+)
 from wind_sensors.nodes.quality import input_quality, subscribe
 from wind_sensors.nodes.receipts import ReceiptSender
 from wind_sensors.nodes.rehearsal import warm_up
@@ -77,6 +86,7 @@ class EstimatorNode(Node):
     Attributes:
         station: The station as it is after parameters.
         received_at: Wall time of the last message [s, monotonic].
+        peers: Nodes of the same process, whose parameters are given together with its own.
 
     Raises:
         UserError: The station or a parameter is wrong.
@@ -107,6 +117,7 @@ class EstimatorNode(Node):
         self._outputs = WindPublishers(self, self.station.platform)
         self._apply_publishing()
         self.received_at = time.monotonic()
+        self.peers: tuple[Node, ...] = ()
         self._idle_checks = 0
         self._last_estimate: WindEstimate | None = None
         subscriptions = {}
@@ -259,10 +270,11 @@ class EstimatorNode(Node):
             items.append(HealthItem("estimate", HealthLevel.ERROR, text))
         for item in items:
             yield Status(item.name, Level(item.level), item.message, item.values)
+        unknown = [unknown_text(*u) for u in unknown_parameters(self, self.peers).items()]
         yield Status(
             "settings",
-            Level.OK,
-            f"Method {self._values['method']}.",
+            Level.WARN if unknown else Level.OK,
+            " ".join([f"Method {self._values['method']}.", *unknown]),
             {"restarts by parameter changes": str(self._restarts)},
         )
         if self.station.platform is not None:

@@ -219,6 +219,7 @@ def run(
         _initialise(arguments)
         _stop_signals.phase = _Phase.BUILDING
         nodes.extend(build())
+        _tell_unknown_parameters(nodes)
         executor = make_executor()
         for node in nodes:
             executor.add_node(node)
@@ -249,6 +250,18 @@ def run(
         rclpy.try_shutdown()
         _stop_signals.uninstall(ignore=last)
     return 0
+
+
+def _tell_unknown_parameters(nodes: Sequence[Node]) -> None:
+    """Warn of parameters that no node of the process has declared, each once."""
+    from wind_sensors.nodes.parameters import unknown_parameters, unknown_text
+
+    told: set[str] = set()
+    for node in nodes:
+        for name, nearest in unknown_parameters(node, nodes).items():
+            if name not in told:
+                told.add(name)
+                node.get_logger().warning(unknown_text(name, nearest))
 
 
 def _initialise(arguments: Sequence[str] | None) -> None:

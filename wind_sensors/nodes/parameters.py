@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, TypeAlias
 
 from wind_sensors.errors import UserError
@@ -60,6 +61,9 @@ class Parameter:
                 return value
             raise ValueError(f"'{self.name}' is true or false, not {value!r}")
         if self.kind is str:
+            if isinstance(value, bool) and str(value).lower() in self.choices:
+                # ROS reads the word `true` as a boolean before anybody can say that it is a word.
+                value = str(value).lower()
             if not isinstance(value, str):
                 raise ValueError(f"'{self.name}' is text, not {value!r}")
             if self.choices and value not in self.choices:
@@ -167,14 +171,48 @@ def changed(
     Args:
         table: The node's parameters.
         values: Their present values.
-        requested: New raw values by name; names outside the table are ignored.
+        requested: New raw values by name, None for one that is to be unset; names outside the
+            table are ignored.
 
     Raises:
         ValueError: A requested value is not acceptable.
     """
     known = {parameter.name: parameter for parameter in table}
+    for name in known.keys() & requested.keys():
+        if requested[name] is None:
+            # ROS would take away the parameter itself, and nothing could set it again.
+            raise ValueError(f"'{name}' cannot be unset while the node runs; set a value")
     accepted = {name: known[name].accept(v) for name, v in requested.items() if name in known}
     return {**values, **accepted}
+
+
+def unknown_parameters(node: Node, peers: Iterable[Node] = ()) -> dict[str, str]:
+    """What was given to a node as a parameter although nobody declared it.
+
+    Args:
+        node: A node that has declared all its parameters.
+        peers: Nodes of the same process; what one of them declares was meant for it.
+
+    Returns:
+        By name, the most similar declared name; empty where none is similar. Quality of service
+        (`qos_overrides`) is left out: it is declared topic by topic as the graph is discovered.
+    """
+    # rclpy has no public way to ask for values of parameters that are not declared.
+    given: Mapping[str, object] = getattr(node, "_parameter_overrides", {})
+    known = list(node.get_parameters_by_prefix(""))
+    names = [
+        name
+        for name in sorted(given)
+        if not name.startswith("qos_overrides.")
+        and not any(one.has_parameter(name) for one in (node, *peers))
+    ]
+    return {name: next(iter(get_close_matches(name, known, n=1, cutoff=0.7)), "") for name in names}
+
+
+def unknown_text(name: str, nearest: str) -> str:
+    """A sentence about a parameter from `unknown_parameters`."""
+    hint = f": did you mean '{nearest}'?" if nearest else "."
+    return f"The parameter '{name}' is not known and has no effect{hint}"
 
 
 def describe(table: Sequence[Parameter]) -> str:

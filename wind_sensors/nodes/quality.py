@@ -29,7 +29,12 @@ SETTLING = 0.3
 """From the discovery of the last awaited subscriber to the first message [s]: the subscriber may
 see the match a little later than the publisher."""
 
-OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY)
+OVERRIDABLE = (
+    QoSPolicyKind.HISTORY,
+    QoSPolicyKind.DEPTH,
+    QoSPolicyKind.RELIABILITY,
+    QoSPolicyKind.DURABILITY,
+)
 """What parameters `qos_overrides.<topic>...` may change."""
 
 

@@ -51,6 +51,9 @@ _PUT_DOWN_PERIOD = 1.0
 _MOST_HELD = 64 * 1024 * 1024
 """Room for what comes before simulated time runs [bytes]."""
 
+_OVERRIDABLE = tuple(kind for kind in OVERRIDABLE if kind != QoSPolicyKind.DURABILITY)
+"""Whether a topic is latched, its publishers say."""
+
 _NOT_SIGNALS = frozenset({"/clock", "/rosout", "/parameter_events"})
 
 
@@ -206,7 +209,7 @@ class RecorderNode(Node):
             )
             self.get_logger().warning(f"{topic}: {self.notes[topic]}.")
         heard = self._heard[topic] = _Heard(listen, request)
-        heard.subscriptions.append(listen(request, OVERRIDABLE))
+        heard.subscriptions.append(listen(request, _OVERRIDABLE))
         stated = self.get_parameter(f"qos_overrides.{topic}.subscription.reliability").value
         heard.is_fixed = (stated == "reliable") != request.reliable
         heard.request = request._replace(reliable=stated == "reliable")
@@ -226,7 +229,7 @@ class RecorderNode(Node):
             request = Request(reliable, heard.request.latched and most.latched)
             if request == heard.request:
                 continue
-            kept = [kind for kind in OVERRIDABLE if kind != QoSPolicyKind.RELIABILITY]
+            kept = [kind for kind in _OVERRIDABLE if kind != QoSPolicyKind.RELIABILITY]
             heard.subscriptions.append(heard.listen(request, kept))
             self.notes[topic] = (
                 f"a publisher came after {self.counts[topic]} messages that offers less than "
