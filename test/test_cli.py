@@ -470,6 +470,26 @@ def test_info_shows_topics_rates_station_and_notes(
     assert "mitsuta_bivane" in capsys.readouterr().out
 
 
+def test_info_finds_the_signals_of_topics_that_are_named_without_a_slash(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = steady_recording()
+    cup, *others = recording.station.instruments
+    assert isinstance(cup, Cup)
+    # Batches: how often one comes is not how often the cup tells an edge.
+    batches = Input(topic="/cup/edges", type="std_msgs/msg/Int64MultiArray")
+    instruments = (cup.model_copy(update={"pulses": batches}), *others)
+    station = recording.station.model_copy(update={"instruments": instruments})
+    folder = write_recording(tmp_path / "batches", replace(recording, station=station))
+    told = []
+    for text in ("/cup/edges", "cup/edges"):
+        file = folder / "recording.yaml"
+        file.write_text(file.read_text("utf-8").replace("/cup/edges", text), encoding="utf-8")
+        assert main(["info", str(folder)]) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
+
+
 @pytest.mark.parametrize("kind", ["png", "svg"])
 def test_plot_draws_every_figure_and_keeps_what_is_there(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str

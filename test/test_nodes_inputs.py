@@ -69,7 +69,7 @@ def _station(tmp_path: Path, *instruments: str, more: str = "") -> Station:
 
 
 def _statuses(inputs: EstimatorInputs) -> dict[str, Status]:
-    health = TopicHealth(inputs, lambda: 5, lambda _: Reason(Level.WARN, "nobody."))
+    health = TopicHealth(inputs, lambda: 5, lambda _: Reason(Level.WARN, "nobody."), str)
     return {status.name: status for status in health.statuses()}
 
 

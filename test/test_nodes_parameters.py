@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistWithCovarianceStamped, Vector3Stamped
 from nodes_harness import Graph, overrides, status, values
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSDurabilityPolicy, QoSReliabilityPolicy
@@ -16,9 +18,13 @@ from std_msgs.msg import String
 
 from wind_sensors.errors import UserError
 from wind_sensors.nodes.estimator_node import EstimatorNode
-from wind_sensors.nodes.kinds import BIVANE, CUP_VANE, PROPELLER_VANE
+from wind_sensors.nodes.kinds import BIVANE, CUP_VANE, PROPELLER_VANE, kind_for
 from wind_sensors.nodes.parameters import Parameter, unknown_parameters
+from wind_sensors.nodes.recorder import RecorderNode
 from wind_sensors.nodes.simulator import SimulatorNode
+from wind_sensors.nodes.topics import station_topics
+from wind_sensors.recordings import load_station, read_recording
+from wind_sensors.recordings.station_files import configuration_folder
 
 
 def _estimator(graph: Graph, **parameters: Any) -> Any:
@@ -120,6 +126,45 @@ def test_what_is_meant_for_a_peer_is_not_unknown(graph: Graph) -> None:
     assert unknown_parameters(node, [peer]) == {}
 
 
+def test_the_earth_fixed_frame_is_the_one_that_the_station_file_states(
+    graph: Graph, tmp_path: Path
+) -> None:
+    assert _estimator(graph).get_parameter("frame_id").value == "enu"
+    assert _estimator(graph, frame_id="odom").get_parameter("frame_id").value == "odom"
+    text = (configuration_folder() / "mast_cup_vane.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "station.yaml"
+    file.write_text(text.replace("frame: enu", "start: 2024-01-01T00:00:00Z"), encoding="utf-8")
+    silent = _estimator(graph, station=str(file))
+    assert silent.get_parameter("frame_id").value == "map"
+    file.write_text(text.replace("frame: enu", "frame: two words"), encoding="utf-8")
+    with pytest.raises(UserError, match=r"recording\.frame"):
+        _estimator(graph, station=str(file))
+
+
+def test_wind_carries_the_frame_of_the_station_file(graph: Graph) -> None:
+    wind = graph.listen(graph.listener(), TwistWithCovarianceStamped, "/wind")
+    truth = graph.listen(graph.listener(), Vector3Stamped, "/truth/wind")
+    _estimator(graph, smoother_lag=0.1)
+    graph.add(
+        SimulatorNode,
+        parameter_overrides=overrides(
+            station="mast_cup_vane", speed=10.0, publish_truth=True, wait_for_subscribers=1
+        ),
+    )
+    graph.spin(lambda: bool(wind and truth))
+    assert wind[0].header.frame_id == truth[0].header.frame_id == "enu"
+
+
+@pytest.mark.parametrize("name", ["frame_id", "sensor_frame_id", "body_frame_id"])
+def test_what_tf2_does_not_take_as_a_frame_is_refused(graph: Graph, name: str) -> None:
+    node = _estimator(graph)
+    assert _set(node, **{name: "robot_1/base-link"}).successful
+    for wrong in ("", "/map", "two words"):
+        assert not _set(node, **{name: wrong}).successful
+        with pytest.raises(UserError, match=name):
+            _estimator(graph, **{name: wrong})
+
+
 def test_a_missing_constant_is_named(graph: Graph) -> None:
     with pytest.raises(UserError, match="damping_ratio"):
         _estimator(graph, station="", **{"cup.profile": "risoe_cup"})
@@ -168,6 +213,56 @@ def test_a_namespace_moves_every_relative_topic(graph: Graph) -> None:
     assert node.topics == {"/mast/cup/pulses", "/mast/vane/joint_states"}
     assert node.count_publishers("/mast/wind") == 1
     assert node.count_publishers("/diagnostics") == 1
+
+
+@pytest.mark.parametrize(
+    "station", sorted(file.stem for file in configuration_folder().glob("*.yaml"))
+)
+def test_shipped_stations_listen_within_their_namespace(graph: Graph, station: str) -> None:
+    node = graph.add(
+        EstimatorNode,
+        kind=kind_for(load_station(station)),
+        namespace="/b",
+        parameter_overrides=overrides(station=station),
+    )
+    assert {topic.split("/")[1] for topic in node.topics} == {"b"}
+
+
+def test_two_stations_of_one_file_are_kept_apart_by_their_namespaces(
+    graph: Graph, tmp_path: Path
+) -> None:
+    diagnostics = graph.listen(graph.listener(), DiagnosticArray, "/diagnostics")
+    recorder = graph.add(
+        RecorderNode,
+        folder=tmp_path / "a",
+        topics=station_topics(load_station("usv")),
+        station=load_station("usv"),
+        namespace="/a",
+    )
+    one, other = (
+        graph.add(
+            EstimatorNode,
+            kind=CUP_VANE,
+            namespace=name,
+            parameter_overrides=overrides(station="usv", diagnostics_period=0.1),
+        )
+        for name in ("/a", "/b")
+    )
+    graph.add(
+        SimulatorNode,
+        namespace="/a",
+        parameter_overrides=overrides(station="usv", speed=10.0, wait_for_subscribers=2),
+    )
+    graph.spin(lambda: recorder.counts.get("/a/cup/pulses", 0) > 20)
+    graph.spin(lambda: recorder.counts.get("/a/wind", 0) > 0)
+    assert one.received > 0
+    assert other.received == 0
+    assert status(diagnostics, "topic /a/cup/pulses").level == b"\x00"
+    assert status(diagnostics, "topic /b/cup/pulses").level == b"\x01"
+    recorder.close()
+    recording = read_recording(tmp_path / "a")
+    assert recording.pulses["cup"].time.size > 20
+    assert recording.platform is not None
 
 
 def test_an_input_nobody_publishes_is_a_warning_that_names_the_topic(graph: Graph) -> None:

@@ -97,6 +97,7 @@ def test_estimates_become_the_documented_output_topics(tmp_path: Path) -> None:
     assert np.array_equal(found[1], processed.velocity)
     assert np.array_equal(found[2], np.diagonal(covariance, axis1=1, axis2=2))
     assert read_series(folder, "/wind/speed").value.tolist() == [7.0, 8.0]
+    assert read_series(folder, "wind/speed").value.tolist() == [7.0, 8.0]
     assert np.allclose(read_series(folder, "/wind/direction_from").value, 0.0)
     assert read_series(folder, "/wind/direction_variance").value.tolist() == [0.03, 0.03]
     assert read_series(folder, "/wind/bias/u").value.tolist() == [0.01, 0.01]

@@ -447,7 +447,7 @@ def test_messages_at_time_nought_and_years_without_any_keep_nobody_waiting(
 
 def test_inputs_only_are_the_topics_of_the_station_file(graph: Graph, tmp_path: Path) -> None:
     folder = tmp_path / "boat"
-    text = station_to_yaml(load_station("usv")).replace(" /wind/cup/", " /wind/cup/")
+    text = station_to_yaml(load_station("usv")).replace("cup/pulses", "wind/cup/pulses")
     topics = {
         "/wind/cup/pulses": _HEADER,
         "/tf_static": "std_msgs/msg/String",  # where tf2 is not installed, too

@@ -21,6 +21,7 @@ from wind_sensors.recordings.station_files import (
     load_station,
     shipped_profiles,
 )
+from wind_sensors.station.inputs import absolute
 from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Station, Vane
 from wind_sensors.station.reference import schema_markdown
 from wind_sensors.station.signals import Recording, TimeArray
@@ -118,13 +119,14 @@ def _print_topics(console: Console, content: BagContent, recording: Recording) -
 
 
 def _stamps(recording: Recording) -> dict[str, TimeArray]:
-    """Stamps of the station's signals by topic."""
+    """Stamps of the station's signals by topic, as the bag names it."""
     found: dict[str, TimeArray] = {}
     for instrument in recording.station.instruments:
         if isinstance(instrument, (Cup, Propeller)) and instrument.name in recording.pulses:
-            found[instrument.pulses.topic] = recording.pulses[instrument.name].time
+            found[absolute(instrument.pulses.topic)] = recording.pulses[instrument.name].time
         elif isinstance(instrument, Vane) and instrument.name in recording.angles:
-            found[instrument.joint_states.topic] = recording.angles[instrument.name].time
+            topic = absolute(instrument.joint_states.topic)
+            found[topic] = recording.angles[instrument.name].time
     return found
 
 

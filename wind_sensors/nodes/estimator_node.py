@@ -45,6 +45,7 @@ from wind_sensors.nodes.rehearsal import warm_up
 from wind_sensors.nodes.station_parameters import (
     Role,
     base_document,
+    earth_frame,
     effective_value,
     require,
     station_table,
@@ -104,6 +105,7 @@ class EstimatorNode(Node):
         self._restarts = 0
         self.station = self._station(self._values)
         require(self.station, kind.needs, kind.name)
+        self._values["frame_id"] = earth_frame(self.station, self._values["frame_id"])
         self._show_effective_values(instruments)
         settings = self._settings(self._values)
         self._estimator = make_estimator(self.station, settings)
@@ -132,7 +134,8 @@ class EstimatorNode(Node):
                     depth=int(number(self._values["input_depth"])),
                 ),
             )
-        self._topics = TopicHealth(self._inputs, self._now, graph_reasons(self, subscriptions))
+        reasons = graph_reasons(self, subscriptions)
+        self._topics = TopicHealth(self._inputs, self._now, reasons, self.resolve_topic_name)
         listeners = int(number(self._values["wait_for_subscribers"]))
         self._receipts = (
             ReceiptSender(
@@ -191,8 +194,9 @@ class EstimatorNode(Node):
         return EstimatorSettings(**chosen)
 
     def _show_effective_values(self, instruments: Sequence[Parameter]) -> None:
-        """Let `ros2 param get` show the constants that a file or a profile stated."""
-        shown = [
+        """Let `ros2 param get` show the constants and the frame that a file or a profile stated."""
+        shown = [RosParameter("frame_id", value=self._values["frame_id"])]
+        shown += [
             RosParameter(p.name, value=value)
             for p in instruments
             if self._values[p.name] is None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from wind_sensors.estimation import METHODS, EstimatorSettings
 from wind_sensors.nodes.parameters import Parameter
 from wind_sensors.nodes.quality import INPUT_DEPTH
 from wind_sensors.nodes.receipts import RECEIPTS_TOPIC
-from wind_sensors.nodes.station_parameters import STATION
+from wind_sensors.nodes.station_parameters import FRAME_ID, FRAME_PATTERN, STATION
 
 _DEFAULTS = EstimatorSettings()
 
@@ -126,18 +128,13 @@ SETTINGS: tuple[Parameter, ...] = (
 NODE_PARAMETERS: tuple[Parameter, ...] = (
     STATION,
     *SETTINGS,
-    Parameter(
-        "frame_id",
-        str,
-        "map",
-        "Frame of the earth-fixed outputs; its axes point east, north, up.",
-        changeable=True,
-    ),
+    replace(FRAME_ID, changeable=True),
     Parameter(
         "sensor_frame_id",
         str,
         "wind_sensor",
         "Frame of wind/apparent: x forward, y left, z up.",
+        pattern=FRAME_PATTERN,
         changeable=True,
     ),
     Parameter(
@@ -145,6 +142,7 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         str,
         "base_link",
         "Frame of wind/body, the platform's: x forward, y left, z up.",
+        pattern=FRAME_PATTERN,
         changeable=True,
     ),
     Parameter(

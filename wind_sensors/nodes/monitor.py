@@ -204,7 +204,8 @@ class MonitorNode(Node):
             subscriptions[source.topic] = subscribe(
                 self, source.message_type, source.topic, source.receive, quality
             )
-        self._topics = TopicHealth(self._inputs, self._now, graph_reasons(self, subscriptions))
+        reasons = graph_reasons(self, subscriptions)
+        self._topics = TopicHealth(self._inputs, self._now, reasons, self.resolve_topic_name)
         self._wind_subscription = None
         if self.reference is not None:
             self._wind_subscription = subscribe(

@@ -29,6 +29,7 @@ from wind_sensors.recordings.live_bag import LiveBag, keep_on_disk
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import BAG_FOLDER, STATION_FILE
 from wind_sensors.recordings.writing import clear_target
+from wind_sensors.station.inputs import absolute, renamed
 from wind_sensors.station.writing import station_to_yaml
 
 if TYPE_CHECKING:
@@ -100,7 +101,8 @@ class RecorderNode(Node):
     Args:
         folder: The recording to write; must not exist unless `force`.
         topics: Topics to record; None records every topic of the graph but /clock and ROS's own.
-        station: Written as the recording's station file; None: the folder holds a bag alone.
+        station: Written as the recording's station file, with the names that its topics have in
+            the bag; None: the folder holds a bag alone.
         force: Replace a recording that is there.
         depth: Messages kept by topic while the recorder is busy.
         receipts_for: Topics of which it tells how many it has had, so that a simulator can wait.
@@ -139,7 +141,8 @@ class RecorderNode(Node):
         self._wanted = (
             None if topics is None else {self.resolve_topic_name(topic): topic for topic in topics}
         )
-        self._bag = _open_bag(Path(folder), station, force=force)
+        kept = None if station is None else renamed(station, self._name_in_bag)
+        self._bag = _open_bag(Path(folder), kept, force=force)
         acknowledged = [self.resolve_topic_name(topic) for topic in receipts_for]
         self._receipts = (
             ReceiptSender(self, lambda: {t: self.counts.get(t, 0) for t in acknowledged})
@@ -155,6 +158,11 @@ class RecorderNode(Node):
                 (_PUT_DOWN_PERIOD, self._put_down),
             )
         ]
+
+    def _name_in_bag(self, topic: str) -> str:
+        """A topic of the station as its file in the recording must name it."""
+        recorded: str = self.resolve_topic_name(topic)
+        return topic if absolute(topic) == recorded else recorded
 
     def discover(self) -> None:
         """Subscribe to the wanted topics that have a publisher by now."""

@@ -22,8 +22,10 @@ from wind_sensors.nodes.scenario_parameters import SCENARIO_PARAMETERS, scenario
 from wind_sensors.nodes.signal_messages import SignalEncoder
 from wind_sensors.nodes.simulated_time import SimulatedTime
 from wind_sensors.nodes.station_parameters import (
+    FRAME_ID,
     STATION,
     base_document,
+    earth_frame,
     station_table,
     station_with,
 )
@@ -92,7 +94,7 @@ NODE_PARAMETERS: tuple[Parameter, ...] = (
         minimum=0.01,
         maximum=60.0,
     ),
-    Parameter("frame_id", str, "map", "Frame of earth-fixed vectors: east, north, up."),
+    FRAME_ID,
     Parameter(
         "output_depth",
         int,
@@ -146,7 +148,9 @@ class SimulatorNode(Node):
         self._begin = 0
         self._end: int | None = None
         encoder = SignalEncoder(
-            self.station, str(values["frame_id"]), with_truth=bool(values["publish_truth"])
+            self.station,
+            earth_frame(self.station, values["frame_id"]),
+            with_truth=bool(values["publish_truth"]),
         )
         self._encoder = encoder
         depth = int(number(values["output_depth"]))
@@ -236,7 +240,7 @@ class SimulatorNode(Node):
 
     def _lonely_topics(self) -> list[str]:
         return sorted(
-            topic
+            self._resolved[topic]
             for topic, outlet in self._outlets.items()
             if outlet.get_subscription_count() < self._least_subscribers(topic)
         )

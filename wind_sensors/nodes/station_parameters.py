@@ -31,6 +31,18 @@ STATION = Parameter(
     "instruments are described by parameters alone.",
 )
 
+FRAME_PATTERN = "[A-Za-z0-9_][A-Za-z0-9_./-]*"
+"""Names of frames that tf2 takes: not empty, no leading slash, no spaces."""
+
+FRAME_ID = Parameter(
+    "frame_id",
+    str,
+    None,
+    "Frame of earth-fixed vectors; its axes point east, north, up. Unset: the station file's "
+    "recording.frame where it states one, else map.",
+    pattern=FRAME_PATTERN,
+)
+
 _IDENTITY = frozenset({"name", "kind"})
 
 
@@ -92,6 +104,28 @@ def station_with(document: Mapping[str, Any], values: Mapping[str, Value], where
     if document.get("platform") is not None:
         merged["platform"] = _overridden(document["platform"], "platform", values)
     return station_of(Document(where, merged, {}), shipped_profiles())
+
+
+def earth_frame(station: Station, given: Value) -> str:
+    """The frame of earth-fixed vectors.
+
+    Args:
+        station: States it, or not.
+        given: The value of `FRAME_ID`; wins.
+
+    Raises:
+        UserError: The station's name is none that tf2 takes.
+    """
+    if given is not None:
+        return str(given)
+    if "frame" not in station.recording.model_fields_set:
+        return "map"
+    try:
+        return str(FRAME_ID.accept(station.recording.frame))
+    except ValueError as problem:
+        raise UserError(
+            f"{problem}.", "recording.frame", "Mend it, or set the parameter frame_id."
+        ) from None
 
 
 def effective_value(station: Station, name: str) -> Any:

@@ -138,12 +138,20 @@ class TopicHealth:
         inputs: Counts their messages.
         now: The node's clock [ns].
         reasons: Why a topic is silent.
+        full_name: The name that a topic of the station has in the graph.
     """
 
-    def __init__(self, inputs: EstimatorInputs, now: Callable[[], int], reasons: Reasons) -> None:
+    def __init__(
+        self,
+        inputs: EstimatorInputs,
+        now: Callable[[], int],
+        reasons: Reasons,
+        full_name: Callable[[str], str],
+    ) -> None:
         self._inputs = inputs
         self._now = now
         self._reasons = reasons
+        self._full_name = full_name
         self._topics = {name: _Topic(count) for name, count in inputs.counts.items()}
 
     def silence(self) -> float:
@@ -160,7 +168,7 @@ class TopicHealth:
         for name, topic in self._topics.items():
             count = self._inputs.counts[name]
             level, message = self._judged(name, topic, count, now)
-            yield Status(f"topic {name}", level, message, _values(count))
+            yield Status(f"topic {self._full_name(name)}", level, message, _values(count))
 
     def _judged(
         self, name: str, topic: _Topic, count: TopicCount, now: int

@@ -134,12 +134,13 @@ def read_series(path: str | Path, topic: str, field_name: str = "data") -> Serie
 
     Args:
         path: Recording folder or bag.
-        topic: Topic.
+        topic: Topic; a relative name counts from the root.
         field_name: Numeric field.
 
     Raises:
         UserError: The bag has no such topic or field.
     """
+    topic = absolute(topic)
     content = read_bag(bag_of(Path(path)), lambda name: name == topic)
     data = content.topics.get(topic)
     if data is None:

@@ -7,14 +7,15 @@ a recording (whole arrays) turn the same messages into the same bits.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BaseModel
 
 from wind_sensors.errors import UserError
-from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Vane
+from wind_sensors.station.model import Angle, Bivane, Cup, Input, Propeller, Station, Vane
 from wind_sensors.station.signals import FloatArray, TimeArray
 
 Signal = Literal[
@@ -69,6 +70,34 @@ def full_type(name: str) -> str:
 def absolute(topic: str) -> str:
     """The name under which a bag has a topic of the root namespace."""
     return topic if topic.startswith("/") else f"/{topic}"
+
+
+def renamed(station: Station, name: Callable[[str], str]) -> Station:
+    """The station with other names of its topics.
+
+    Args:
+        station: The station.
+        name: The new name of a topic.
+    """
+    found: Station = _renamed(station, name)
+    return found
+
+
+def _renamed(node: Any, name: Callable[[str], str]) -> Any:
+    """A part of a station with its topics renamed; the part itself where nothing changes."""
+    if isinstance(node, Input):
+        topic = name(node.topic)
+        return node if topic == node.topic else node.model_copy(update={"topic": topic})
+    if isinstance(node, BaseModel):
+        parts = {key: getattr(node, key) for key in node.model_fields_set}
+        changed = {key: _renamed(part, name) for key, part in parts.items()}
+        if all(changed[key] is part for key, part in parts.items()):
+            return node
+        return node.model_copy(update=changed)
+    if isinstance(node, tuple):
+        items = tuple(_renamed(item, name) for item in node)
+        return node if all(a is b for a, b in zip(items, node, strict=True)) else items
+    return node
 
 
 def resolved(source: Input, signal: Signal) -> Input:

@@ -45,7 +45,8 @@ class Input(Entry):
     """
 
     topic: str
-    """Name of the topic."""
+    """Name of the topic; without a slash in front it counts from the node's namespace, and in a bag
+    from the root. A recording's own file names what was recorded in a namespace in full."""
     type: str = ""
     """ROS message type, e.g. `std_msgs/msg/Header`; empty: the default of the signal."""
     field: str = ""
@@ -479,7 +480,8 @@ class RecordingInfo(Entry):
     start: str = "1970-01-01T00:00:00Z"
     """First moment of the recording, UTC."""
     frame: str = "enu"
-    """Name of the earth-fixed frame of the wind vectors (ENU)."""
+    """Name of the earth-fixed frame of the wind vectors (ENU). A live node of a station that states
+    none says `map`."""
     averaging_time: NonNegative = 0.0
     """Every message is a mean over this time [s] and stamped at its end; 0: samples."""
     measuring_height: Positive = 10.0
