@@ -27,6 +27,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String
 
 from wind_sensors.errors import UserError
+from wind_sensors.nodes import recorder as recorder_module
 from wind_sensors.nodes.player import PlayerNode
 from wind_sensors.nodes.quality import input_quality, output_quality
 from wind_sensors.nodes.recorder import RecorderNode
@@ -157,6 +158,7 @@ def test_compose_runs_a_station_to_its_end(graph: Graph, tmp_path: Path) -> None
     # Blocks of half a second are completed at both ends.
     assert 20.0 * SECONDS <= len(content.topics["/wind"].raw) <= 20.0 * (SECONDS + 1.0)
     assert len(content.topics["/wind/mean"].raw) == 1
+    assert all(min(topic.log_time) > 0 for topic in content.topics.values() if topic.raw)
 
 
 def test_a_composition_that_is_interrupted_publishes_the_window_under_way(
@@ -442,7 +444,7 @@ def test_messages_at_time_nought_and_years_without_any_keep_nobody_waiting(
     assert told == sorted(told)
     assert told[0] >= _START
     assert "2 messages were recorded at time 0" in player.notes[0]
-    assert "8760.0 hours" in player.notes[1]
+    assert "8760.0 hours in which nothing was recorded are skipped" in player.notes[1]
 
 
 def test_inputs_only_are_the_topics_of_the_station_file(graph: Graph, tmp_path: Path) -> None:
@@ -480,6 +482,11 @@ def test_inputs_only_of_a_bag_alone_leave_out_what_an_estimator_publishes(
     bag = _bag(tmp_path / "bag", kept | left_out, [_START])
     output = _replayed(graph, tmp_path, str(bag), "--inputs-only")
     assert f"Published {len(kept)} messages" in output
+    bare = _bag(tmp_path / "outputs", left_out, [_START])
+    replay = _wind(graph.domain, tmp_path, "replay", str(bare), "--inputs-only")
+    output, _ = replay.communicate(timeout=60)
+    assert replay.returncode == 2
+    assert "no topic of the station's inputs" in " ".join(output.split())
 
 
 def test_a_type_that_is_not_installed_costs_its_own_topic_alone(
@@ -508,3 +515,22 @@ def test_topics_to_replay_may_be_relative_and_misspelt_ones_are_told(
     player = graph.add(PlayerNode, content=read_bag(bag), topics=["vane"], namespace="/a")
     graph.spin(lambda: player.finished)
     assert (player.published, player.notes) == (1, [])
+
+
+def test_what_has_no_room_before_simulated_time_is_counted(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "_MOST_HELD", 30)
+    recorder = graph.add(
+        RecorderNode, folder=tmp_path / "full", topics=["/text"],
+        parameter_overrides=overrides(use_sim_time=True),
+    )
+    texts = graph.listener().create_publisher(String, "/text", output_quality())
+    graph.spin(lambda: texts.get_subscription_count() == 1)
+    for text in ("fits", "does not fit any more"):
+        texts.publish(String(data=text))
+    graph.spin(lambda: recorder.without_room == 1)
+    recorder.close()
+    (raw,) = read_bag(tmp_path / "full" / "bag").topics["/text"].raw
+    assert b"fits" in raw
+    assert "no room for 1 more" in recorder.notes["/clock"]

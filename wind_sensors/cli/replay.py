@@ -112,13 +112,26 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _leave_inputs(content: BagContent, folder: Path) -> None:
-    """Take from a bag's content what is no input of its station, or what an estimator published."""
+    """Take from a bag's content what is no input of its station, or what an estimator published.
+
+    Raises:
+        UserError: Nothing is left, or the station file is wrong.
+    """
+    from wind_sensors.errors import UserError
     from wind_sensors.nodes.topics import TRANSFORM_TOPICS, is_output
     from wind_sensors.recordings import load_station
     from wind_sensors.recordings.reading import STATION_FILE, home_of, station_topics
 
     file = home_of(folder) / STATION_FILE
     inputs = station_topics(load_station(file)) | TRANSFORM_TOPICS if file.exists() else None
-    for name, data in list(content.topics.items()):
-        if is_output(name, data.message_type) if inputs is None else name not in inputs:
+    names = sorted(content.topics)
+    for name in names:
+        message_type = content.topics[name].message_type
+        if is_output(name, message_type) if inputs is None else name not in inputs:
             del content.topics[name]
+    if not content.topics:
+        raise UserError(
+            "the bag has no topic of the station's inputs.",
+            str(folder),
+            f"Topics in the bag: {', '.join(names)}.",
+        )

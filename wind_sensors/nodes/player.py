@@ -157,10 +157,7 @@ class PlayerNode(Node):
         long = step > LONGEST_GAP * max(rate, 1.0) * 1e9
         if long.any():
             hours = float(step[long].sum()) * 1e-9 / 3600.0
-            self.notes.append(
-                f"{np.count_nonzero(long)} gaps without any message, {hours:.1f} hours in all, "
-                "are skipped"
-            )
+            self.notes.append(f"{hours:.1f} hours in which nothing was recorded are skipped")
         return np.cumsum(np.where(long, 0, step))
 
     @property

@@ -112,6 +112,7 @@ class RecorderNode(Node):
         counts: Messages by topic.
         refused: Topics that could not be recorded, with the reason.
         notes: Of topics that may lack messages, and why.
+        without_room: Messages that were lost because simulated time did not run for so long.
 
     Raises:
         UserError: The folder exists, or cannot be written; the callbacks raise it too, when the
@@ -136,7 +137,7 @@ class RecorderNode(Node):
         self._heard: dict[str, _Heard] = {}
         self._held: list[_Held] = []
         self._room = _MOST_HELD
-        self._without_room = 0
+        self.without_room = 0
         self._depth = depth
         self._wanted = (
             None if topics is None else {self.resolve_topic_name(topic): topic for topic in topics}
@@ -267,7 +268,7 @@ class RecorderNode(Node):
     def _hold(self, topic: str, connection: Connection, message: bytes) -> None:
         """Keep a message for the first /clock, the first ones where there is no room for all."""
         if len(message) > self._room:
-            self._without_room += 1
+            self.without_room += 1
             return
         self._room -= len(message)
         self.counts[topic] += 1
@@ -279,12 +280,12 @@ class RecorderNode(Node):
         Args:
             now: The first simulated time [ns]; None: there was none, so wall time has to do.
         """
-        if not self._held:
+        if "/clock" in self.notes or not (self._held or self.without_room):
             return
         at = "at the first simulated time" if now is not None else "at wall time: no /clock came"
         note = f"{len(self._held)} messages came before it and were recorded {at}"
-        if self._without_room:
-            note += f"; there was no room for {self._without_room} more, which are lost"
+        if self.without_room:
+            note += f"; there was no room for {self.without_room} more, which are lost"
         self.notes["/clock"] = note
         self.get_logger().warning(f"/clock: {note}.")
         held, self._held = self._held, []
