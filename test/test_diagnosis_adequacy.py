@@ -517,6 +517,15 @@ def test_a_wake_as_wide_as_the_search_allows_is_none(width: float, possible: boo
     assert is_plausible(Term(catalogue()["wake_shadow"], "cup", values)) is possible
 
 
+@pytest.mark.parametrize(("larger", "possible"), [(1.0, True), (3.0, True), (6.0, False)])
+def test_no_flow_past_a_mast_changes_the_speed_by_half(larger: float, possible: bool) -> None:
+    """None of the harmonics is at its bound: they add up where no wind need have come from."""
+    values = {"cosine_1": 0.044, "sine_1": 0.042, "cosine_2": -0.03, "sine_2": -0.015}
+    grown = {name: larger * value for name, value in values.items()}
+    term = Term(catalogue()["flow_distortion"], "station", {**grown, "deflection": 0.0})
+    assert is_plausible(term) is possible
+
+
 @pytest.mark.parametrize(("deflection", "possible"), [(0.0, True), (1.0, True), (1.5, False)])
 def test_a_flow_past_a_mast_bends_as_potential_flow_does(deflection: float, possible: bool) -> None:
     values = {"cosine_1": 0.05, "sine_1": 0.0, "cosine_2": 0.03, "sine_2": 0.0}

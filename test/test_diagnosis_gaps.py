@@ -72,6 +72,17 @@ def test_a_number_to_which_a_vane_returns_is_told(
     assert seen.max() == (0.0 if stays < 12 else 1.0) or 12 <= stays < 24
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_number_is_told_within_the_noise_of_its_converter(seed: int) -> None:
+    angle = swinging(seed)
+    gone = np.abs(angle - 0.1) < 0.1
+    noise = np.radians(0.05) * np.random.default_rng(seed).standard_normal(angle.size)
+    seen = readings(np.where(gone, 2.0, angle) + noise).at_one_number > 0.0
+    assert np.mean(seen[gone]) > 0.95
+    assert not seen[~gone].any()
+    assert not readings(angle + noise).at_one_number.any()
+
+
 @pytest.mark.parametrize("step", [0.5, 6.0, 24.0])
 def test_coarse_readings_and_rests_are_no_one_number(step: float) -> None:
     angle = swinging(3)

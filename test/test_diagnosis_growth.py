@@ -99,8 +99,10 @@ def test_ice_that_brakes_the_bearing_is_one_effect() -> None:
 
 def test_what_begins_may_grow_from_there_or_from_before_the_record() -> None:
     begins = Term(catalogue()["icing"], "cup", {**FULL, "growth_time": 0.0}, (95.0, None))
-    from_there, from_before = begins.growing
+    from_there, halfway, from_before = begins.growing
     assert from_there.interval == (95.0, None) and from_there.grows
+    grown = (95.0 - halfway.interval[0]) / halfway.values["growth_time"]
+    assert halfway.grows and 1.0 - np.exp(-grown) == pytest.approx(0.5)
     assert from_before.interval == ALWAYS and from_before.grows
     assert from_there.growing == () == replace(begins, interval=ALWAYS).growing
     offset = Term(catalogue()["calibration_offset"], "cup", {"offset": -1.0}, (95.0, None))

@@ -132,6 +132,43 @@ def test_waves_are_expected_in_full_where_the_references_eddies_are_not() -> Non
         assert abs(share) < 0.1
 
 
+def sailed(seed: int, axes: str) -> Recording:
+    """The boat under way, its velocity reported in some axes, read as if in those of the platform.
+
+    Args:
+        seed: Of wind and course.
+        axes: `platform` or `earth`.
+    """
+    platform = usv().platform
+    assert platform is not None
+    reporting = usv().model_copy(
+        update={"platform": platform.model_copy(update={"velocity_axes": axes})}
+    )
+    wind = isotropic_spec(6.0, 0.1, 60.0, direction=1.0, seed=seed)
+    scenario = Scenario(wind, duration=400.0, seed=seed, trajectory=boat(seed=seed))
+    return replace(simulate(reporting, scenario), station=usv(), truth=None)
+
+
+def test_a_velocity_in_earths_axes_is_a_frame_error() -> None:
+    baseline = learn([sailed(seed, "platform") for seed in range(3)])
+    found = diagnose(sailed(20, "earth"), baseline)
+    assert found.verdict == "named"
+    (finding,) = found.findings
+    assert finding.term.key == ("frame_error", "platform")
+    assert finding.term.values["other_axes"] == 1.0
+    assert finding.proof is not None and finding.proof.excess_removed > 0.95
+    assert found.station.platform is not None
+    assert found.station.platform.velocity_axes == "earth"
+
+
+def test_axes_that_are_mistaken_twice_are_right() -> None:
+    wrong = suggested(
+        "frame_error", "platform", roll=0.0, pitch=0.0, velocity_turn=0.0, other_axes=1.0
+    )
+    assert planted(usv(), [wrong]) != usv()
+    assert planted(planted(usv(), [wrong]), [wrong]) == usv()
+
+
 @pytest.mark.parametrize("seed", [1, 11])
 def test_a_lever_arm_is_as_long_as_it_is_where_the_reference_knows_no_eddy(seed: int) -> None:
     reference = on_waves(seed + 1, 0.06).reference
