@@ -77,6 +77,13 @@ def test_what_passes_gains_all_the_time_that_it_holds(
     bounce = {"bounce_probability": 0.02, "bounce_delay": 0.001}
     drawn = Term(catalogue()["extra_pulses"], "cup", bounce, (50.0, 250.0))
     assert is_steady(comparison, before, seen(noise, drawn))
+    # A vane out of balance swings in each lull, while the wind may cross a wake but once.
+    leans = {"imbalance": 15.0, "tilt_x": 1.0, "tilt_y": 0.0}
+    swings = Term(catalogue()["vane_imbalance"], "vane", leans, (50.0, 250.0))
+    assert is_steady(comparison, before, seen(noise, swings)) is steady
+    wake = {"bearing_from": 0.0, "depth": 0.2, "width": 10.0, "flank": 0.0}
+    shaded = Term(catalogue()["wake_shadow"], "cup", wake, (50.0, 250.0))
+    assert is_steady(comparison, before, seen(noise, shaded))
 
 
 @pytest.mark.parametrize(

@@ -42,9 +42,12 @@ than the first has its moment there."""
 
 
 def needs_to_be_steady(term: Term) -> bool:
-    """Whether a term begins or ends inside the record and acts all the time in between."""
+    """Whether a term begins or ends inside the record and acts again and again in between.
+
+    A sector the wind may cross but once; in weak wind a vane out of balance swings in each lull.
+    """
     effect = term.effect
-    seldom = effect.legible or effect.noisy or effect.occasional
+    seldom = effect.legible or effect.noisy or (effect.occasional and effect.sector != "")
     return term.interval != ALWAYS and not seldom
 
 
