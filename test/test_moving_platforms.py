@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from wind_sensors.estimation import EstimatorSettings, HealthLevel, ProcessedRecording, process
+from wind_sensors.estimation import (
+    EstimatorSettings,
+    HealthLevel,
+    ProcessedRecording,
+    make_estimator,
+    process,
+)
 from wind_sensors.estimation.circumstances import CircumstanceSource, with_mount_covariance
 from wind_sensors.estimation.intake import Block, Series
 from wind_sensors.motion import earth_wind_covariance, frames, sensor_rotation
@@ -18,7 +26,7 @@ from wind_sensors.recordings.station_files import configuration_folder, load_sta
 from wind_sensors.simulation import Scenario, Trajectory, simulate
 from wind_sensors.simulation.trajectories import CARRIERS, boat
 from wind_sensors.station.model import Station
-from wind_sensors.station.signals import PlatformStates, Recording
+from wind_sensors.station.signals import Angles, PlatformStates, Pulses, Recording, Velocities
 from wind_sensors.turbulence.synthesis import isotropic_spec
 
 DIRECTION = 0.6
@@ -298,6 +306,148 @@ def test_a_platform_that_was_never_heard_of_is_said_so_and_no_wind_is_made_up() 
     assert found.time.size == 0
     assert health(found, "motion")[0] == HealthLevel.ERROR
     assert health(found, "platform")[0] == HealthLevel.STALE
+
+
+def _told_apart(recording: Recording, keep: Callable[[Any], Any], step: int = 1) -> Recording:
+    """The recording with its velocities at times of their own, of which some are kept.
+
+    Args:
+        keep: Tells of seconds since the start which velocities there are.
+        step: Every so many states there is one.
+    """
+    states = recording.platform
+    assert states is not None
+    since = (states.time[::step] - recording.start) * 1e-9
+    kept = keep(since)
+    moved = Velocities(states.time[::step][kept], states.velocity[::step][kept])
+    unknown = np.full_like(states.velocity, np.nan)
+    return replace(
+        recording, platform=replace(states, velocity=unknown), platform_velocity=moved
+    )
+
+
+def imu_station(**platform: Any) -> Station:
+    """The boat with an Imu and a velocity of its own instead of odometry."""
+    return moving_station(
+        odometry=None, imu={"topic": "/imu"}, twist={"topic": "/velocity"}, **platform
+    )
+
+
+@pytest.mark.parametrize("method", ["kalman", "inverse", "naive"])
+def test_without_a_velocity_no_wind_is_made_up_and_it_comes_back(method: Any) -> None:
+    recording = sailed(imu_station(), boat(), duration=120.0)
+    gone = _told_apart(recording, lambda s: (s < 50.0) | (s > 70.0))
+    found = process(gone, EstimatorSettings(method=method))
+    seconds = (found.time - recording.start) * 1e-9
+    assert np.any(seconds < 50.0) and np.any(seconds > 75.0)
+    assert not np.any((seconds > 50.6) & (seconds < 69.4))
+    level, message = health(found, "motion")
+    assert level == HealthLevel.WARN
+    assert "attitude or velocity had not been heard of" in message
+
+
+@pytest.mark.parametrize("never", [True, False])
+def test_a_velocity_that_dies_or_never_comes_is_an_error_of_the_motion(never: bool) -> None:
+    recording = sailed(imu_station(), boat(), duration=40.0)
+    found = process(_told_apart(recording, lambda s: s < (0.0 if never else 25.0)))
+    assert (found.time.size == 0) == never
+    assert np.all((found.time - recording.start) * 1e-9 < 25.6)
+    level, message = health(found, "motion")
+    assert level == HealthLevel.ERROR
+    assert ("heard of platform velocity" if never else "motion is not known") in message
+
+
+def test_a_velocity_beside_every_attitude_gives_the_wind_of_odometry() -> None:
+    recording = sailed(imu_station(), boat(), duration=60.0)
+    with_odometry = replace(recording, station=moving_station())
+    told_apart = _told_apart(recording, lambda s: s >= 0.0)
+    bits = [process(r).velocity for r in (with_odometry, recording, told_apart)]
+    np.testing.assert_array_equal(bits[1], bits[2])
+    np.testing.assert_allclose(bits[0], bits[1], rtol=0, atol=1e-9)
+
+
+def test_a_velocity_once_a_second_is_waited_for_and_alarms_nobody() -> None:
+    station = imu_station()
+    recording = sailed(station, Trajectory("circle", speed=3.0, turn_seconds=60.0), duration=90.0)
+    slow = _told_apart(recording, lambda s: s >= 0.0, step=20)
+    # A smoother that waits longer than the velocity would hide whether it is waited for.
+    estimator = make_estimator(station, EstimatorSettings(smoother_lag=0.3))
+    assert slow.platform is not None and slow.platform_velocity is not None
+    calls: list[tuple[int, Callable[[], None]]] = [
+        (time, partial(estimator.add_pulse, "cup", time))
+        for time in recording.pulses["cup"].time.tolist()
+    ]
+    angles = recording.angles["vane"]
+    for time, angle in zip(angles.time.tolist(), angles.angle.tolist(), strict=True):
+        calls.append((time, partial(estimator.add_angle, "vane", time, angle)))
+    states = slow.platform
+    for i, time in enumerate(states.time.tolist()):
+        told = states.attitude[i], None, states.angular_rate[i], states.position[i]
+        calls.append((time, partial(estimator.add_platform, time, *told)))
+    moved = slow.platform_velocity
+    for time, velocity in zip(moved.time.tolist(), moved.velocity, strict=True):
+        calls.append((time, partial(estimator.add_platform_velocity, time, velocity)))
+    alarms, refused = set(), set()
+    for time, call in sorted(calls, key=lambda item: item[0]):
+        call()
+        if estimator.take_estimates() and time > recording.start + 20e9:
+            told = {item.name: item for item in estimator.health()}
+            inputs = ("cup", "vane", "platform", "platform velocity", "clock")
+            alarms |= {told[name] for name in inputs if told[name].level != HealthLevel.OK}
+            refused.add(told["motion"].values["refused estimates"])
+    assert not alarms
+    # How slow it is was learnt within those 20 s.
+    assert len(refused) == 1
+    found = process(slow)
+    off = found.velocity[:, :2] - true_wind(recording, found.time)
+    assert np.sqrt(np.mean(np.square(off[200:-100]))) < 0.35
+
+
+def test_a_clock_that_jumps_back_does_not_end_the_wind_of_an_imu_with_a_velocity() -> None:
+    recording = _told_apart(sailed(imu_station(), boat(), duration=40.0), lambda s: s >= 0.0)
+    states, moved = recording.platform, recording.platform_velocity
+    assert states is not None and moved is not None
+
+    def again(*signals: Any) -> list[Any]:
+        return [np.concatenate((signal, signal)) for signal in signals]
+
+    pulses, angles = recording.pulses["cup"], recording.angles["vane"]
+    twice = replace(
+        recording,
+        pulses={"cup": Pulses(*again(pulses.time))},
+        angles={"vane": Angles(*again(angles.time, angles.angle))},
+        platform=PlatformStates(
+            *again(
+                states.time, states.attitude, states.velocity, states.angular_rate, states.position
+            )
+        ),
+        platform_velocity=Velocities(*again(moved.time, moved.velocity)),
+    )
+    once, found = process(recording), process(twice)
+    np.testing.assert_array_equal(found.time[-300:], once.time[-300:])
+    np.testing.assert_array_equal(found.velocity[-300:], once.velocity[-300:])
+    assert found.time.size > 1.9 * once.time.size
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_what_is_left_out_until_the_platform_is_heard_of_alarms_only_if_it_lasts(
+    late: bool,
+) -> None:
+    recording = sailed(moving_station(), boat(), duration=40.0)
+    states = recording.platform
+    assert states is not None
+    heard = (states.time - recording.start) * 1e-9 > (20.0 if late else 1.0)
+    found = process(
+        replace(
+            recording,
+            platform=PlatformStates(
+                states.time[heard], states.attitude[heard], states.velocity[heard],
+                states.angular_rate[heard], states.position[heard],
+            ),
+        )
+    )
+    assert found.time[0] > recording.start + (19.0 if late else 0.4) * 1e9
+    assert health(found, "motion")[0] == (HealthLevel.WARN if late else HealthLevel.OK)
 
 
 def test_an_unsure_mounting_makes_the_mean_direction_as_unsure_and_hardly_the_speed() -> None:

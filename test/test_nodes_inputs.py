@@ -11,8 +11,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TwistStamped
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import FluidPressure, Temperature
+from sensor_msgs.msg import FluidPressure, Imu, Temperature
 from std_msgs.msg import Float32, Float64MultiArray, Header, Int64
 
 from wind_sensors.errors import UserError
@@ -44,6 +46,7 @@ class Collector:
         self.pulses: dict[str, list[tuple[int, float | None]]] = defaultdict(list)
         self.angles: dict[str, list[tuple[int, float]]] = defaultdict(list)
         self.platform: list[tuple[Any, ...]] = []
+        self.velocity: list[tuple[int, Any]] = []
         self.air: list[tuple[int, float | None, float | None]] = []
 
     def add_pulse(self, name: str, time_ns: int, turns: float | None = None) -> None:
@@ -54,6 +57,9 @@ class Collector:
 
     def add_platform(self, *state: Any) -> None:
         self.platform.append(state)
+
+    def add_platform_velocity(self, time_ns: int, velocity: Any) -> None:
+        self.velocity.append((time_ns, velocity))
 
     def add_air(
         self, time_ns: int, temperature: float | None = None, pressure: float | None = None
@@ -165,14 +171,58 @@ def test_odometry_arrives_as_in_a_recording(tmp_path: Path) -> None:
     np.testing.assert_array_equal(position, offline.platform.position)
 
 
-def test_imu_waits_for_the_velocity_around_it(tmp_path: Path) -> None:
+def test_attitude_and_velocity_arrive_apart_as_in_a_recording(tmp_path: Path) -> None:
     more = "platform: {imu: /imu, twist: /velocity}\n"
     heard, offline, _ = _through(_station(tmp_path, CUP % "/p", VANE % "/v", more=more))
-    time = np.array([state[0] for state in heard.platform])
-    velocity = np.array([state[2] for state in heard.platform])
-    np.testing.assert_array_equal(time, offline.platform.time[: len(time)])
-    np.testing.assert_allclose(velocity, offline.platform.velocity[: len(time)], rtol=0, atol=1e-12)
-    assert len(time) >= len(offline.platform.time) - 1
+    time, attitude, told, rate, _ = zip(*heard.platform, strict=True)
+    assert set(told) == {None}
+    np.testing.assert_array_equal(time, offline.platform.time)
+    np.testing.assert_array_equal(attitude, offline.platform.attitude)
+    np.testing.assert_array_equal(rate, offline.platform.angular_rate)
+    at, velocity = zip(*heard.velocity, strict=True)
+    np.testing.assert_array_equal(at, offline.platform_velocity.time)
+    np.testing.assert_array_equal(velocity, offline.platform_velocity.velocity)
+
+
+def test_an_imu_that_says_it_has_no_orientation_is_not_believed(tmp_path: Path) -> None:
+    station = _station(tmp_path, CUP % "/p", VANE % "/v", more="platform: {imu: /imu}\n")
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: 5)
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    data = TopicData("sensor_msgs/msg/Imu")
+    for second, variance in enumerate((0.0, -1.0, 0.01)):
+        message = Imu()
+        message.header.stamp.sec = 1 + second
+        message.orientation.w = 1.0
+        message.orientation_covariance[0] = variance
+        receive["/imu"](message)
+        data.log_time.append(second)
+        data.raw.append(serialize_message(message))
+    assert [state[0] for state in heard.platform] == [10**9, 3 * 10**9]
+    assert inputs.counts["/imu"].without_orientation == 1
+    told = {name: status.message for name, status in _statuses(inputs).items()}
+    assert "1 without an orientation (orientation_covariance[0] is -1" in told["topic /imu"]
+    pulses = TopicData("std_msgs/msg/Header", [1], [serialize_message(Header(stamp=Time(sec=1)))])
+    offline = signals_of(
+        BagContent({"/imu": data, "/p": pulses}, typestore()), station, "test", "test"
+    )
+    assert offline.platform is not None
+    assert offline.platform.time.tolist() == [10**9, 3 * 10**9]
+    assert any("1 of 3 messages say that they have no orientation" in n for n in offline.notes)
+
+
+def test_a_velocity_that_is_no_number_is_left_out_and_counted(tmp_path: Path) -> None:
+    more = "platform: {imu: /imu, twist: /velocity}\n"
+    heard: Any = Collector()
+    inputs = EstimatorInputs(
+        _station(tmp_path, CUP % "/p", VANE % "/v", more=more), heard, lambda: 5
+    )
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    message = TwistStamped()
+    message.twist.linear.y = np.nan
+    receive["/velocity"](message)
+    assert not heard.velocity
+    assert inputs.counts["/velocity"].not_numbers == 1
 
 
 def test_air_arrives_with_its_units(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.estimation import forward
-from wind_sensors.estimation.intake import Block
+from wind_sensors.estimation.intake import Block, Series
 from wind_sensors.motion import Motion, PlatformTrack, TrackLimits, rotations, true_motion
 from wind_sensors.motion.downwash import rotor_downwash
 from wind_sensors.motion.relative_wind import sensor_rotation, sensor_velocity
@@ -18,7 +18,7 @@ from wind_sensors.station.model import (
     Rotor,
     Station,
 )
-from wind_sensors.station.signals import PlatformStates
+from wind_sensors.station.signals import PlatformStates, Velocities
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -39,6 +39,30 @@ def as_calibrated(station: Station) -> Station:
     )})
 
 
+class _Latest:
+    """The latest messages of an input.
+
+    Args:
+        width: Numbers in a message.
+
+    Attributes:
+        time: [ns], shape (n,).
+        value: Shape (n, width).
+    """
+
+    def __init__(self, width: int) -> None:
+        self.time: TimeArray = np.empty(0, dtype=np.int64)
+        self.value: FloatArray = np.empty((0, width))
+
+    def take(self, new: Series) -> None:
+        """Messages of a block, some of which may have been looked at ahead of it."""
+        if new.time.size:
+            old = self.time < new.time[0]
+            kept = _KEPT_STATES + new.time.size
+            self.time = np.concatenate((self.time[old], new.time))[-kept:]
+            self.value = np.concatenate((self.value[old], new.value))[-kept:]
+
+
 class CircumstanceSource:
     """Remembers the latest platform states and air, and reads them at any instant of a block.
 
@@ -50,8 +74,9 @@ class CircumstanceSource:
 
     def __init__(self, station: Station, use_air: bool) -> None:
         self._use_air = use_air
-        self._platform_states: FloatArray = np.empty((0, 13))
-        self._platform_times: TimeArray = np.empty(0, dtype=np.int64)
+        self._states = _Latest(13)
+        platform = station.platform
+        self._velocities = _Latest(3) if platform is not None and platform.moves_apart else None
         self._temperature = np.nan
         self._pressure = np.nan
         self.station = station
@@ -66,7 +91,10 @@ class CircumstanceSource:
     @property
     def known(self) -> bool:
         """Whether the carrier has been heard of, if there is one."""
-        return self.station.platform is None or self._platform_times.size > 0
+        if self.station.platform is None:
+            return True
+        moves = self._velocities is None or self._velocities.time.size > 0
+        return moves and self._states.time.size > 0
 
     def take(self, block: Block) -> None:
         """Remember what a block says about mount and air."""
@@ -74,13 +102,9 @@ class CircumstanceSource:
             self._temperature = float(block.temperature.value[-1, 0])
         if block.pressure.time.size:
             self._pressure = float(block.pressure.value[-1, 0])
-        new = block.platform
-        if new.time.size:
-            old = self._platform_times < new.time[0]
-            self._platform_times = np.concatenate((self._platform_times[old], new.time))
-            self._platform_states = np.concatenate((self._platform_states[old], new.value))
-            self._platform_times = self._platform_times[-_KEPT_STATES - new.time.size :]
-            self._platform_states = self._platform_states[-_KEPT_STATES - new.time.size :]
+        self._states.take(block.platform)
+        if self._velocities is not None:
+            self._velocities.take(block.velocity)
 
     def _air(self, rows: FloatArray) -> None:
         rows[:, forward.AIR_TEMPERATURE] = self._usual_temperature
@@ -108,7 +132,7 @@ class CircumstanceSource:
         if platform is None:
             rows[:, 3:12] = self._mast_rotation
             rows[:, forward.MOUNT_GRAVITY_Z] = -STANDARD_GRAVITY
-        elif self._platform_times.size and times.size:
+        elif self.known and times.size:
             self._moving(rows, times, platform, wind)
         else:
             rows[:, 3:12] = np.eye(3).ravel()
@@ -118,10 +142,10 @@ class CircumstanceSource:
     def _moving(
         self, rows: FloatArray, times: TimeArray, platform: Platform, wind: FloatArray
     ) -> None:
-        states = self._platform_states
+        states, apart = self._states.value, self._velocities
         track = PlatformTrack(
             PlatformStates(
-                time=self._platform_times,
+                time=self._states.time,
                 attitude=states[:, 0:4],
                 velocity=states[:, 4:7],
                 angular_rate=states[:, 7:10],
@@ -132,6 +156,7 @@ class CircumstanceSource:
                 velocity_deviation=platform.velocity_noise,
             ),
             with_travel=platform.position_share != 0.0,
+            velocities=None if apart is None else Velocities(apart.time, apart.value),
         )
         sample = track.at(times)
         motion = true_motion(replace_clock(platform), sample.motion, 1.0)

@@ -14,6 +14,7 @@ from wind_sensors.estimation.intake import (
     PULSES,
     READINGS,
     TEMPERATURE,
+    VELOCITY,
     InputRecord,
     Intake,
 )
@@ -24,7 +25,10 @@ from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.motion.frames import direction_from_deg
 from wind_sensors.station.model import Station
 
-_NEEDED = (PULSES, READINGS, PLATFORM)
+_MOTION = (PLATFORM, VELOCITY)
+_NEEDED = (PULSES, READINGS, *_MOTION)
+_STEADY = (READINGS, *_MOTION)
+"""Inputs that send whatever happens."""
 _LATE_SHARE = 0.001
 _FEW = 5
 """So few messages that do not fit may be mere strays."""
@@ -116,12 +120,12 @@ def _judged(
     limit = settings.gap_time
     if record.kind == READINGS and presence is not None:
         limit = max(limit, presence.limit(name))
-    if record.kind in (READINGS, PLATFORM) and age > limit:
+    if record.kind in _STEADY and age > limit:
         return HealthLevel.STALE, f"Silent for {age:.1f} s."
     invalid, gaps, late = (span.count(t) for t in (record.invalid, record.gaps, record.late))
     if invalid:
         return HealthLevel.WARN, f"{invalid} messages were not numbers{span.text}."
-    if record.kind in (READINGS, PLATFORM) and gaps:
+    if record.kind in _STEADY and gaps:
         longest = f", the longest {record.longest_gap:.1f} s" if span.whole else span.text
         return HealthLevel.WARN, f"{gaps} gaps{longest}."
     if late > _LATE_SHARE * span.count(record.accepted):
@@ -170,7 +174,9 @@ def input_health(
             continue
         if record.kind == PRESSURE and station.air.pressure is None:
             continue
-        age = max(0.0, (intake.watermark - record.last) * 1e-9) if record.last else 0.0
+        # A block that waits for a slow platform makes none of the others silent.
+        heard = record.newest if record.kind in _STEADY and record.newest else record.last
+        age = max(0.0, (intake.watermark - heard) * 1e-9) if heard else 0.0
         level, message = _judged(name, record, age, settings, presence, span)
         items.append(HealthItem(name, level, message, _values(record, age)))
     return items
@@ -208,17 +214,26 @@ def clock_health(intake: Intake, unknown: Mapping[str, Tally], whole: bool) -> H
     return HealthItem("clock", HealthLevel.WARN, text, values)
 
 
-def motion_health(refused: Tally, refusing: bool, now: int, whole: bool) -> HealthItem:
+def motion_health(intake: Intake, refused: Tally, refusing: bool, whole: bool) -> HealthItem:
     """Whether the carrier's motion is known well enough for a wind in the earth frame.
 
     Args:
+        intake: Tells what was heard of the carrier, and the time.
         refused: Estimates that would have been guesswork.
         refusing: Whether the latest was one of them.
-        now: The intake's clock [ns].
         whole: Judge by everything since the start, else by the last minute.
     """
     values = {"refused estimates": str(refused.total)}
-    span = _Span(now, whole)
+    span = _Span(intake.watermark, whole)
+    unheard = [n for n, r in intake.records.items() if r.kind in _MOTION and not r.last]
+    if unheard:
+        return HealthItem(
+            "motion",
+            HealthLevel.ERROR if refusing else HealthLevel.STALE,
+            f"Nothing usable was heard of {' and '.join(unheard)}: no wind is published until it "
+            "is.",
+            values,
+        )
     if refusing:
         return HealthItem(
             "motion",
@@ -230,11 +245,17 @@ def motion_health(refused: Tally, refusing: bool, now: int, whole: bool) -> Heal
         return HealthItem(
             "motion",
             HealthLevel.WARN,
-            f"{span.count(refused)} estimates were left out{span.text}: the platform had not been "
-            "heard of around them.",
+            f"{span.count(refused)} estimates were left out{span.text}: {_around(intake)} had not "
+            "been heard of around them.",
             values,
         )
     return HealthItem("motion", HealthLevel.OK, "The platform's motion is known.", values)
+
+
+def _around(intake: Intake) -> str:
+    """What has to be heard of for the motion to be known."""
+    apart = any(record.kind == VELOCITY for record in intake.records.values())
+    return "the platform's attitude or velocity" if apart else "the platform"
 
 
 def estimate_health(

@@ -20,7 +20,8 @@ from wind_sensors.estimation.recent import Tally
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
-PULSES, READINGS, PLATFORM, TEMPERATURE, PRESSURE = range(5)
+PULSES, READINGS, PLATFORM, VELOCITY, TEMPERATURE, PRESSURE = range(6)
+_MOTION = (PLATFORM, VELOCITY)
 _CONFIRMED = 3
 """So many messages in a row make a jump of the clock believable."""
 FAR_AHEAD_NS = 60_000_000_000
@@ -37,6 +38,10 @@ class Series(NamedTuple):
     value: FloatArray
 
 
+def _nothing() -> Series:
+    return Series(np.empty(0, dtype=np.int64), np.empty((0, 1)))
+
+
 @dataclass(frozen=True)
 class Block:
     """All messages of an interval, in order.
@@ -49,6 +54,8 @@ class Block:
             position; width 13.
         temperature: [deg C].
         pressure: [Pa].
+        velocity: Of the platform, where it comes apart from the states; shortly after `stop`, too.
+            Width 3.
     """
 
     start: int
@@ -58,6 +65,7 @@ class Block:
     platform: Series
     temperature: Series
     pressure: Series
+    velocity: Series = field(default_factory=_nothing)
 
 
 @dataclass
@@ -73,6 +81,8 @@ class InputRecord:
         offsets: By how much the last of those were ahead of the clock [ns].
         longest_gap: [s].
         first, last: Times of the first and the last released message [ns], 0 without any.
+        newest: Time of the newest message, released or not [ns]; 0 without any since the clock was
+            set.
         rate: Recent rate [Hz].
     """
 
@@ -88,6 +98,7 @@ class InputRecord:
     longest_gap: float = 0.0
     first: int = 0
     last: int = 0
+    newest: int = 0
     rate: float = 0.0
     times: list[int] = field(default_factory=list)
     values: list[tuple[float, ...]] = field(default_factory=list)
@@ -150,6 +161,7 @@ class Intake:
         for record in self.records.values():
             record.times.clear()
             record.values.clear()
+            record.newest = 0
         self.origin = None
         self.released = 0
         self._seen = False
@@ -248,6 +260,7 @@ class Intake:
             record.late.add(self.watermark)
             record.offsets.append(time - self.watermark)
             return
+        record.newest = max(record.newest, time)
         record.times.append(time)
         record.values.append(value)
 
@@ -300,16 +313,15 @@ class Intake:
             platform=self._single(PLATFORM, parts, stop + look_ahead),
             temperature=self._single(TEMPERATURE, parts, stop),
             pressure=self._single(PRESSURE, parts, stop),
+            velocity=self._single(VELOCITY, parts, stop + look_ahead),
         )
 
     def _follow_platform_rate(self) -> None:
         """Look far enough ahead to see the next state of a slow platform, within bounds."""
-        for record in self.records.values():
-            if record.kind == PLATFORM and record.rate > 0.0:
-                wanted = round(_INTERVALS_AHEAD * 1e9 / record.rate)
-                self._look_ahead = min(
-                    max(wanted, self._shortest_look_ahead), self._longest_look_ahead
-                )
+        rates = [r.rate for r in self.records.values() if r.kind in _MOTION and r.rate > 0.0]
+        if rates:
+            wanted = round(_INTERVALS_AHEAD * 1e9 / min(rates))
+            self._look_ahead = min(max(wanted, self._shortest_look_ahead), self._longest_look_ahead)
 
     def _of_kind(self, kind: int, parts: dict[str, Series]) -> dict[str, Series]:
         return {n: parts[n] for n, r in self.records.items() if r.kind == kind}
@@ -318,7 +330,7 @@ class Intake:
         for name, record in self.records.items():
             if record.kind != kind:
                 continue
-            if kind == PLATFORM and record.times:
+            if kind in _MOTION and record.times:
                 ahead = _sorted(
                     [t for t in record.times if t < until],
                     [v for t, v in zip(record.times, record.values, strict=True) if t < until],
@@ -330,7 +342,7 @@ class Intake:
                     np.concatenate((part.value, ahead.value)),
                 )
             return parts[name]
-        return Series(np.empty(0, dtype=np.int64), np.empty((0, 1)))
+        return _nothing()
 
     def _taken(self, record: InputRecord, stop: int) -> Series:
         times, values = record.times, record.values
@@ -378,18 +390,22 @@ def merged(blocks: list[Block]) -> Block:
             np.concatenate([p.time for p in parts]), np.concatenate([p.value for p in parts])
         )
 
+    def once(parts: list[Series]) -> Series:
+        both = series(parts)
+        times, first = np.unique(both.time, return_index=True)
+        return Series(times, both.value[first])
+
     if len(blocks) == 1:
         return blocks[0]
-    platform = series([b.platform for b in blocks])
-    times, first = np.unique(platform.time, return_index=True)
     return Block(
         start=blocks[0].start,
         stop=blocks[-1].stop,
         pulses={n: series([b.pulses[n] for b in blocks]) for n in blocks[0].pulses},
         readings={n: series([b.readings[n] for b in blocks]) for n in blocks[0].readings},
-        platform=Series(times, platform.value[first]),
+        platform=once([b.platform for b in blocks]),
         temperature=series([b.temperature for b in blocks]),
         pressure=series([b.pressure for b in blocks]),
+        velocity=once([b.velocity for b in blocks]),
     )
 
 

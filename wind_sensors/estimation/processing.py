@@ -60,17 +60,26 @@ def _inputs(
     for name, a in recording.angles.items():
         feed = angles(name, a.time.tolist(), a.angle.tolist())
         inputs.append((estimator.measured(name, a.time, zero), feed))
-    states = recording.platform
+    states, moved = recording.platform, recording.platform_velocity
     if states is not None:
         times = states.time.tolist()
 
         def platform(i: int) -> None:
             estimator.add_platform(
-                times[i], states.attitude[i], states.velocity[i], states.angular_rate[i],
-                states.position[i],
+                times[i], states.attitude[i], None if moved is not None else states.velocity[i],
+                states.angular_rate[i], states.position[i],
             )
 
         inputs.append((estimator.measured("platform", states.time, zero), platform))
+    if moved is not None:
+        velocity = moved.velocity
+        instants = moved.time.tolist()
+        inputs.append(
+            (
+                estimator.measured("platform velocity", moved.time, zero),
+                lambda i: estimator.add_platform_velocity(instants[i], velocity[i]),
+            )
+        )
     if recording.temperature is not None:
         warmth = recording.temperature
         inputs.append(

@@ -31,6 +31,7 @@ from wind_sensors.estimation.intake import (
     PULSES,
     READINGS,
     TEMPERATURE,
+    VELOCITY,
     Block,
     Correction,
     Intake,
@@ -61,6 +62,7 @@ FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
 
 _PLATFORM, _TEMPERATURE, _PRESSURE = "platform", "temperature", "pressure"
+_VELOCITY = "platform velocity"
 _SPEED_MEMORY = 0.9
 """Share of the old value in the running apparent speed, per block."""
 _LOOK_AHEAD_NS = (100_000_000, 2_000_000_000)
@@ -102,7 +104,10 @@ def _inputs(station: Station) -> dict[str, tuple[int, int, Correction | None]]:
             if isinstance(instrument, Bivane):
                 inputs[f"{instrument.name}/elevation"] = (READINGS, 1, correction)
     if station.platform is not None:
-        inputs[_PLATFORM] = (PLATFORM, 13, changing_correction(clocks[_PLATFORM]))
+        correction = changing_correction(clocks[_PLATFORM])
+        inputs[_PLATFORM] = (PLATFORM, 13, correction)
+        if station.platform.moves_apart:
+            inputs[_VELOCITY] = (VELOCITY, 3, correction)
     inputs[_TEMPERATURE] = (TEMPERATURE, 1, None)
     inputs[_PRESSURE] = (PRESSURE, 1, None)
     return inputs
@@ -161,6 +166,8 @@ class StreamingEstimator:
         self._latest: WindowStatistics | None = None
         self._delivered = False
         self._refused = Tally()
+        self._refused_at_first = 0
+        self._motion_is_known = False
         self._refusing = False
         self._refused_since = 0
         self._apparent_speed = 0.0
@@ -204,13 +211,21 @@ class StreamingEstimator:
         self,
         time_ns: int,
         attitude_xyzw: npt.ArrayLike,
-        velocity: npt.ArrayLike,
+        velocity: npt.ArrayLike | None,
         angular_rate: npt.ArrayLike,
         position: npt.ArrayLike,
     ) -> None:
-        """State of the carrier, as in `PlatformStates`; ignored on a station without platform."""
+        """State of the carrier, as in `PlatformStates`; ignored on a station without platform.
+
+        Args:
+            velocity: None: `add_platform_velocity` tells it, on a station where it comes apart.
+        """
         if self.station.platform is None:
             return
+        if velocity is None:
+            velocity = np.zeros(3)
+        elif self.station.platform.moves_apart:
+            self.add_platform_velocity(time_ns, velocity)
         value = tuple(
             float(v)
             for part in (attitude_xyzw, velocity, angular_rate, position)
@@ -220,6 +235,19 @@ class StreamingEstimator:
             self._intake.records[_PLATFORM].invalid.add(self._intake.watermark)
             return
         self._take(_PLATFORM, time_ns, value)
+
+    def add_platform_velocity(self, time_ns: int, velocity: npt.ArrayLike) -> None:
+        """Velocity of the carrier [m/s], where the station has a topic of its own for it.
+
+        The motion is known where both this and the attitude are, each within `TrackLimits`.
+        """
+        if _VELOCITY not in self._inputs:
+            return
+        value = tuple(float(v) for v in np.asarray(velocity, dtype=np.float64))
+        if not all(math.isfinite(v) for v in value):
+            self._intake.records[_VELOCITY].invalid.add(self._intake.watermark)
+            return
+        self._take(_VELOCITY, time_ns, value)
 
     def add_air(
         self, time_ns: int, temperature: float | None = None, pressure: float | None = None
@@ -237,7 +265,7 @@ class StreamingEstimator:
         """Times of measurement [ns] of an input's messages by what is known of its clock.
 
         Args:
-            name: Instrument, `platform`, `temperature` or `pressure`.
+            name: Instrument, `platform`, `platform velocity`, `temperature` or `pressure`.
             stamps: [ns], shape (n,).
             zero: Stamp from which a drift counts [ns].
         """
@@ -289,9 +317,6 @@ class StreamingEstimator:
             estimates = part_of(estimates, told)
         known = trusted(estimates)
         if estimates.time.size:
-            if known.time.size < estimates.time.size:
-                refused = estimates.time.size - known.time.size
-                self._refused.add(self._intake.watermark, refused)
             latest = int(estimates.time[-1])
             if known.time.size:
                 self._refused_since = int(known.time[-1]) if known.time[-1] < latest else 0
@@ -299,6 +324,7 @@ class StreamingEstimator:
                 self._refused_since = int(estimates.time[0])
             silence = latest - self._refused_since if self._refused_since else 0
             self._refusing = silence > self.settings.gap_time * 1e9
+            self._count_refused(estimates.time.size - known.time.size, known)
         if known.time.size:
             self._estimates.append(known)
             self._delivered = True
@@ -306,6 +332,18 @@ class StreamingEstimator:
             keep = _SPEED_MEMORY if self._apparent_speed > 0.0 else 0.0
             self._apparent_speed = keep * self._apparent_speed + (1.0 - keep) * speed
         return known
+
+    def _count_refused(self, refused: int, known: Estimates) -> None:
+        """Count estimates that were left out, but not the moment until the carrier is first heard
+        of: vane and rotor may well speak before it."""
+        if not self._motion_is_known:
+            self._refused_at_first += refused
+            self._motion_is_known = known.time.size > 0
+            refused = 0
+            if self._refusing:
+                refused, self._refused_at_first = self._refused_at_first, 0
+        if refused:
+            self._refused.add(self._intake.watermark, refused)
 
     def _close(self, windows: list[WindowStatistics]) -> None:
         if windows:
@@ -334,6 +372,8 @@ class StreamingEstimator:
             self._close(self._windows.finish(estimates, small, self._presence))
         self._last_health = self._core.health() if self._core is not None else []
         self._core = None
+        self._motion_is_known = False
+        self._refused_at_first = 0
 
     def flush(self) -> None:
         """No more messages: make everything final, including the last, shorter window."""
@@ -377,7 +417,7 @@ class StreamingEstimator:
         items = input_health(intake, self.station, self.settings, self._presence, whole)
         items.append(clock_health(intake, self._unknown, whole))
         if self.station.platform is not None:
-            items.append(motion_health(self._refused, self._refusing, intake.watermark, whole))
+            items.append(motion_health(intake, self._refused, self._refusing, whole))
         core = self._core
         told = core.health() if core is not None else self._last_health
         missing = estimate_health(intake, self._presence, self._delivered)

@@ -1,7 +1,13 @@
 """Frames, attitudes, the carrier's motion, and the wind it makes or hides."""
 
 from wind_sensors.motion.platform_errors import reported_motion, true_motion
-from wind_sensors.motion.platform_track import Motion, PlatformTrack, TrackLimits, TrackSample
+from wind_sensors.motion.platform_track import (
+    Motion,
+    PlatformTrack,
+    TrackLimits,
+    TrackSample,
+    velocity_at,
+)
 from wind_sensors.motion.relative_wind import (
     apparent_wind,
     earth_wind,
@@ -21,5 +27,6 @@ __all__ = [
     "reported_motion",
     "sensor_rotation",
     "true_motion",
+    "velocity_at",
     "wind_in_platform",
 ]

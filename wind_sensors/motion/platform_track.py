@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wind_sensors.errors import UserError
 from wind_sensors.motion import rotations
-from wind_sensors.station.signals import PlatformStates
+from wind_sensors.station.signals import PlatformStates, Velocities
 
 FloatArray = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]
@@ -94,6 +94,79 @@ class TrackLimits:
     acceleration: float = 1.0
 
 
+@dataclass(frozen=True)
+class _Places:
+    """Where instants lie among the times at which something was told.
+
+    Attributes:
+        left, right: Indices of the neighbours, shape (n,).
+        inside: Place between them, 0 to 1, shape (n,).
+        beyond: Time since the last one, or (negative) until the first [s], shape (n,).
+        span: Between the neighbours [s], shape (n,).
+    """
+
+    left: npt.NDArray[np.intp]
+    right: npt.NDArray[np.intp]
+    inside: FloatArray
+    beyond: FloatArray
+    span: FloatArray
+
+    @classmethod
+    def of(cls, known: TimeArray, wanted: TimeArray) -> _Places:
+        """Places of the instants `wanted` among the sorted times `known`, of which there are some.
+        """
+        count = known.size
+        left = np.clip(np.searchsorted(known, wanted, side="right") - 1, 0, max(count - 2, 0))
+        right = np.minimum(left + 1, count - 1)
+        span = (known[right] - known[left]).astype(np.float64) * 1e-9
+        since = (wanted - known[left]).astype(np.float64) * 1e-9
+        fraction = np.divide(since, span, out=np.zeros(wanted.shape), where=span > 0.0)
+        beyond = np.where(
+            wanted < known[0],
+            (wanted - known[0]) * 1e-9,
+            np.where(wanted > known[-1], (wanted - known[-1]) * 1e-9, 0.0),
+        )
+        return cls(left, right, np.clip(fraction, 0.0, 1.0), beyond, span)
+
+    @property
+    def bulge(self) -> FloatArray:
+        """s (1 - s) T^2 [s^2], shape (n,)."""
+        bulge: FloatArray = self.inside * (1.0 - self.inside) * self.span * self.span
+        return bulge
+
+    def line(self, values: FloatArray) -> FloatArray:
+        """Values (m, k) along straight lines, the ends beyond them; shape (n, k)."""
+        weight = self.inside[:, np.newaxis]
+        between: FloatArray = (1.0 - weight) * values[self.left] + weight * values[self.right]
+        return between
+
+    def within(self, limits: TrackLimits) -> npt.NDArray[np.bool_]:
+        """Where reading is no guesswork, shape (n,)."""
+        close = np.abs(self.beyond) <= limits.longest_extrapolation
+        return np.asarray(close & ((self.span <= limits.longest_gap) | (self.bulge == 0.0)))
+
+
+def velocity_at(
+    told: Velocities, times: TimeArray, limits: TrackLimits | None = None
+) -> FloatArray:
+    """A velocity that is told apart from the attitude, at any instants [m/s], shape (n, 3).
+
+    Args:
+        told: In order of time.
+        times: [ns], shape (n,).
+        limits: How far it may be stretched; None: as a platform's states.
+
+    Returns:
+        Nan where it would be guesswork, as in `TrackSample.known`.
+    """
+    if told.time.size == 0:
+        return np.full((times.size, 3), np.nan)
+    places = _Places.of(told.time, times)
+    known = places.within(limits if limits is not None else TrackLimits())
+    velocity: FloatArray = np.where(known[:, np.newaxis], places.line(told.velocity), np.nan)
+    return velocity
+
+
 class PlatformTrack:
     """A carrier's states as a function of time.
 
@@ -105,6 +178,8 @@ class PlatformTrack:
         states: States in any order; doubles in time are dropped.
         limits: How far they may be stretched.
         with_travel: Give the velocity that follows from the positions, too.
+        velocities: Of the platform, in order of time, instead of those of the states: they come
+            at times of their own, and the motion is known where both are.
 
     Raises:
         UserError: There is no usable state.
@@ -115,9 +190,11 @@ class PlatformTrack:
         states: PlatformStates,
         limits: TrackLimits | None = None,
         with_travel: bool = False,
+        velocities: Velocities | None = None,
     ) -> None:
         self.limits = limits if limits is not None else TrackLimits()
         self._with_travel = with_travel
+        self._apart = velocities
         finite = (
             np.isfinite(states.attitude).all(axis=1)
             & np.isfinite(states.velocity).all(axis=1)
@@ -125,7 +202,7 @@ class PlatformTrack:
             & (np.linalg.norm(states.attitude, axis=1) > 0.5)
         )
         times, first = np.unique(states.time[finite], return_index=True)
-        if times.size == 0:
+        if times.size == 0 or (velocities is not None and velocities.time.size == 0):
             raise UserError(
                 "The platform has no usable state.",
                 "platform",
@@ -150,31 +227,25 @@ class PlatformTrack:
     def at(self, times: TimeArray) -> TrackSample:
         """The motion at instants [ns], shape (n,)."""
         wanted = np.asarray(times, dtype=np.int64)
-        count = self._time.size
-        left = np.clip(np.searchsorted(self._time, wanted, side="right") - 1, 0, max(count - 2, 0))
-        right = np.minimum(left + 1, count - 1)
-        span = (self._time[right] - self._time[left]).astype(np.float64) * 1e-9
-        since = (wanted - self._time[left]).astype(np.float64) * 1e-9
-        fraction = np.divide(since, span, out=np.zeros(wanted.shape), where=span > 0.0)
-        inside = np.clip(fraction, 0.0, 1.0)
-        weight = inside[:, np.newaxis]
+        places = _Places.of(self._time, wanted)
+        if self._apart is None:
+            moved, velocity = places, places.line(self._velocity)
+        else:
+            moved = _Places.of(self._apart.time, wanted)
+            velocity = moved.line(self._apart.velocity)
         motion = Motion(
-            attitude=rotations.slerp(self._attitude[left], self._attitude[right], inside),
-            velocity=(1.0 - weight) * self._velocity[left] + weight * self._velocity[right],
-            angular_rate=(1.0 - weight) * self._rate[left] + weight * self._rate[right],
-            position=(1.0 - weight) * self._position[left] + weight * self._position[right],
+            attitude=rotations.slerp(
+                self._attitude[places.left], self._attitude[places.right], places.inside
+            ),
+            velocity=velocity,
+            angular_rate=places.line(self._rate),
+            position=places.line(self._position),
         )
         if self._with_travel:
             motion = replace(motion, travel=self._travel(wanted))
-        beyond = np.where(
-            wanted < self._time[0],
-            (wanted - self._time[0]) * 1e-9,
-            np.where(wanted > self._time[-1], (wanted - self._time[-1]) * 1e-9, 0.0),
-        )
         longest = self.limits.longest_extrapolation
-        motion = _carried_on(motion, np.clip(beyond, -longest, longest))
-        bulge: FloatArray = inside * (1.0 - inside) * span * span
-        return self._judged(motion, beyond, bulge, span)
+        motion = _carried_on(motion, np.clip(places.beyond, -longest, longest))
+        return self._judged(motion, places, moved)
 
     def _travel(self, wanted: TimeArray) -> FloatArray:
         """Change of the position over a second around each instant [m/s], shape (n, 3)."""
@@ -194,20 +265,17 @@ class PlatformTrack:
         velocity: FloatArray = moved / span[:, np.newaxis]
         return velocity
 
-    def _judged(
-        self, motion: Motion, beyond: FloatArray, bulge: FloatArray, span: FloatArray
-    ) -> TrackSample:
+    def _judged(self, motion: Motion, places: _Places, moved: _Places) -> TrackSample:
         """Variances: an acceleration a unseen for t adds a t^2/2 outside, a s(1-s) T^2/2 inside."""
         limits = self.limits
-        unseen = 0.5 * (np.square(beyond) + bulge)
+        unseen = 0.5 * (np.square(places.beyond) + places.bulge)
         return TrackSample(
             motion=motion,
             attitude_variance=limits.attitude_deviation**2
             + np.square(limits.angular_acceleration * unseen),
             velocity_variance=limits.velocity_deviation**2
-            + np.square(limits.acceleration * (np.abs(beyond) + np.sqrt(bulge))),
-            known=(np.abs(beyond) <= limits.longest_extrapolation)
-            & ((span <= limits.longest_gap) | (bulge == 0.0)),
+            + np.square(limits.acceleration * (np.abs(moved.beyond) + np.sqrt(moved.bulge))),
+            known=places.within(limits) & moved.within(limits),
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wind_sensors.errors import UserError
-from wind_sensors.nodes.platform import ImuWithTwist, odometry_state
+from wind_sensors.nodes.platform import imu_state, odometry_state, twist_velocity
 from wind_sensors.station.inputs import (
     LATEST,
     AirSignal,
@@ -29,6 +29,7 @@ from wind_sensors.station.inputs import (
     is_plausible,
     resolved,
     scaled,
+    tells_orientation,
 )
 from wind_sensors.station.model import Cup, Input, Propeller, Station
 
@@ -57,7 +58,8 @@ class TopicCount:
 
     Attributes:
         received: All of them.
-        without_stamp, not_numbers, implausible, unusable: What was left out, and why.
+        without_stamp, not_numbers, without_orientation, implausible, unusable: What was left out,
+            and why.
         problem: Of the last unusable one.
         restarts: How often a counter began anew from zero; its turns go on.
         purposes: What the messages are for.
@@ -66,6 +68,7 @@ class TopicCount:
     received: int = 0
     without_stamp: int = 0
     not_numbers: int = 0
+    without_orientation: int = 0
     implausible: int = 0
     unusable: int = 0
     problem: str = ""
@@ -108,11 +111,14 @@ class SignalTaker(Protocol):
         self,
         time_ns: int,
         attitude_xyzw: npt.ArrayLike,
-        velocity: npt.ArrayLike,
+        velocity: npt.ArrayLike | None,
         angular_rate: npt.ArrayLike,
         position: npt.ArrayLike,
     ) -> None:
-        """State of the carrier."""
+        """State of the carrier; the velocity is None where it comes apart."""
+
+    def add_platform_velocity(self, time_ns: int, velocity: npt.ArrayLike) -> None:
+        """Velocity of the carrier."""
 
     def add_air(
         self, time_ns: int, temperature: float | None = None, pressure: float | None = None
@@ -310,11 +316,10 @@ class EstimatorInputs:
             self._add(source, "platform", self._odometry(source))
         elif platform.imu is not None:
             imu = resolved(platform.imu, "imu")
-            fusion = ImuWithTwist(waits=platform.twist is not None)
-            self._add(imu, "platform attitude", self._imu(imu, fusion))
+            self._add(imu, "platform attitude", self._imu(imu, apart=platform.moves_apart))
             if platform.twist is not None:
                 twist = resolved(platform.twist, "twist")
-                self._add(twist, "platform velocity", self._twist(fusion))
+                self._add(twist, "platform velocity", self._twist(twist))
 
     def _odometry(self, source: Input) -> Handler:
         count = self.counts[source.topic]
@@ -328,22 +333,34 @@ class EstimatorInputs:
 
         return odometry
 
-    def _imu(self, source: Input, fusion: ImuWithTwist) -> Handler:
+    def _imu(self, source: Input, *, apart: bool) -> Handler:
+        """Attitudes; their velocity comes apart, or the platform only turns."""
         count = self.counts[source.topic]
 
         def imu(message: Any, stamp: int) -> None:
-            if not fusion.add_imu(message, stamp or self._now()):
+            if not tells_orientation(message.orientation_covariance[0]):
+                count.without_orientation += 1
+                return
+            state = imu_state(message, stamp or self._now())
+            if state is None:
                 count.not_numbers += 1
-            for state in fusion.ready():
-                self.estimator.add_platform(*state)
+            else:
+                self.estimator.add_platform(
+                    state.time, state.attitude, None if apart else state.velocity,
+                    state.angular_rate, state.position,
+                )
 
         return imu
 
-    def _twist(self, fusion: ImuWithTwist) -> Handler:
+    def _twist(self, source: Input) -> Handler:
+        count = self.counts[source.topic]
+
         def twist(message: Any, stamp: int) -> None:
-            fusion.add_twist(message, stamp or self._now())
-            for state in fusion.ready():
-                self.estimator.add_platform(*state)
+            velocity = twist_velocity(message)
+            if velocity is None:
+                count.not_numbers += 1
+            else:
+                self.estimator.add_platform_velocity(stamp or self._now(), velocity)
 
         return twist
 

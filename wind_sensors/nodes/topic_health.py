@@ -26,6 +26,10 @@ _LEAST_SILENCE = 5 * _SECOND
 _COMPLAINTS = {
     "without_stamp": "without a stamp",
     "not_numbers": "not a number",
+    "without_orientation": (
+        "without an orientation (orientation_covariance[0] is -1; name the topic of a driver or "
+        "filter that has one)"
+    ),
     "implausible": "not plausible (check `modulus`, `scale` and `offset`)",
     "unusable": "unusable ({problem})",
 }
@@ -207,6 +211,7 @@ def _values(count: TopicCount) -> dict[str, str]:
         "received": str(count.received),
         "without stamp": str(count.without_stamp),
         "not numbers": str(count.not_numbers),
+        "without orientation": str(count.without_orientation),
         "not plausible": str(count.implausible),
         "unusable": str(count.unusable),
         "restarts of a counter": str(count.restarts),

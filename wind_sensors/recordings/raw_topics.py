@@ -27,6 +27,7 @@ from wind_sensors.station.signals import (
     Pulses,
     Recording,
     TimeArray,
+    Velocities,
     Winds,
 )
 
@@ -208,8 +209,11 @@ def _add_platform(
         _add_vector(content, ("angular_velocity",), states.angular_rate)
     if platform.twist is not None:
         source = resolved(platform.twist, "twist")
-        content = _content(contents, types, source, states.time, BODY_FRAME)
-        _add_vector(content, ("twist", "linear"), states.velocity)
+        moved = recording.platform_velocity
+        if moved is None:
+            moved = Velocities(states.time, states.velocity)
+        content = _content(contents, types, source, moved.time, BODY_FRAME)
+        _add_vector(content, ("twist", "linear"), moved.velocity)
 
 
 def _add_vector(content: _Content, base: FieldPath, values: FloatArray) -> None:

@@ -225,7 +225,7 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
         )
     truth_topic = next((t for t in content.topics if t.endswith(TRUTH_TOPIC)), None)
     truth = reader.winds(Input(topic=truth_topic)) if truth_topic else None
-    platform = platform_states(station, content, reader.notes) if station.platform else None
+    platform, platform_velocity = platform_states(station, content, reader.notes)
     temperature = reader.air(station.air.temperature, "temperature")
     pressure = reader.air(station.air.pressure, "pressure")
     start, stop = _span(content, pulses, angles, reference, platform)
@@ -238,6 +238,7 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
         angles=angles,
         reference=reference,
         platform=platform,
+        platform_velocity=platform_velocity,
         temperature=temperature,
         pressure=pressure,
         truth=truth,

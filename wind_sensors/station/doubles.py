@@ -14,10 +14,11 @@ from wind_sensors.station.signals import (
     Recording,
     Series,
     TimeArray,
+    Velocities,
     Winds,
 )
 
-Signal = TypeVar("Signal", Pulses, Angles, Winds, Series, PlatformStates)
+Signal = TypeVar("Signal", Pulses, Angles, Winds, Series, PlatformStates, Velocities)
 
 
 def without_doubles(recording: Recording) -> Recording:
@@ -33,6 +34,9 @@ def without_doubles(recording: Recording) -> Recording:
         angles={name: _once(angles) for name, angles in recording.angles.items()},
         reference=None if recording.reference is None else _once(recording.reference),
         platform=None if recording.platform is None else _once(recording.platform),
+        platform_velocity=(
+            None if recording.platform_velocity is None else _once(recording.platform_velocity)
+        ),
         temperature=None if recording.temperature is None else _once(recording.temperature),
         pressure=None if recording.pressure is None else _once(recording.pressure),
     )

@@ -135,6 +135,16 @@ def elevation_input(azimuth: Input, elevation: Input) -> Input:
     return resolved(elevation, "angle")
 
 
+def tells_orientation(first_covariance: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Whether a sensor_msgs/Imu has an orientation at all.
+
+    Args:
+        first_covariance: `orientation_covariance[0]`; the message's definition reserves -1 for
+            devices without an orientation.
+    """
+    return np.asarray(np.asarray(first_covariance, dtype=np.float64) >= 0.0, dtype=np.bool_)
+
+
 def field_path(field: str) -> FieldPath:
     """`wind.data[3]` as ("wind", "data", 3).
 

@@ -460,6 +460,11 @@ class Platform(Entry):
     mounting_noise_deg: NonNegative = 0.0
     """Standard deviation of `sensor_rotation_deg` against the truth."""
 
+    @property
+    def moves_apart(self) -> bool:
+        """Whether the velocity comes apart from the attitude, at times of its own."""
+        return self.odometry is None and self.imu is not None and self.twist is not None
+
 
 class Change(Entry):
     """Something that is different from one moment on, or for a while."""

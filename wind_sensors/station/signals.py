@@ -200,7 +200,8 @@ class PlatformStates:
     Attributes:
         time: [ns], shape (n,).
         attitude: Quaternion x, y, z, w that turns platform axes into ENU, shape (n, 4).
-        velocity: Of the platform's origin, in platform axes [m/s], shape (n, 3).
+        velocity: Of the platform's origin, in platform axes [m/s], shape (n, 3); nan where it comes
+            apart from the attitude and is not known then.
         angular_rate: In platform axes [rad/s], shape (n, 3).
         position: ENU [m], shape (n, 3).
     """
@@ -210,6 +211,15 @@ class PlatformStates:
     velocity: FloatArray
     angular_rate: FloatArray
     position: FloatArray
+
+
+@dataclass(frozen=True)
+class Velocities:
+    """Velocity of the carrier where it is told apart from the attitude, in the axes that the
+    station states [m/s], shape (n, 3)."""
+
+    time: TimeArray
+    velocity: FloatArray
 
 
 @dataclass(frozen=True)
@@ -232,6 +242,7 @@ class Recording:
         angles: By vane name; a bivane has `<name>` (azimuth) and `<name>/elevation`.
         reference: Reference wind, if any.
         platform: Carrier, if any.
+        platform_velocity: Its velocities as they came, where they come apart from the attitudes.
         temperature, pressure: Air, if any.
         truth: True wind at the sensor, if a simulator wrote it.
         truth_topic: Where it was read from; empty where it was not.
@@ -246,6 +257,7 @@ class Recording:
     angles: dict[str, Angles] = field(default_factory=dict)
     reference: Winds | None = None
     platform: PlatformStates | None = None
+    platform_velocity: Velocities | None = None
     temperature: Series | None = None
     pressure: Series | None = None
     truth: Winds | None = None

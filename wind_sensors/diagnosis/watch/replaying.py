@@ -29,13 +29,16 @@ def _sources(recording: Recording, watch: Watch) -> Iterator[tuple[TimeArray, Fe
         yield p.time, _pulses(watch, name, p.turns)
     for name, a in recording.angles.items():
         yield a.time, _angles(watch, name, a.angle)
-    wind, states = recording.reference, recording.platform
+    wind, states, moved = recording.reference, recording.platform, recording.platform_velocity
     if wind is not None:
         yield wind.time, lambda i, t: watch.add_wind(t, wind.velocity[i])
     if states is not None:
         yield states.time, lambda i, t: watch.add_platform(
-            t, states.attitude[i], states.velocity[i], states.angular_rate[i], states.position[i]
+            t, states.attitude[i], None if moved is not None else states.velocity[i],
+            states.angular_rate[i], states.position[i]
         )
+    if moved is not None:
+        yield moved.time, lambda i, t: watch.add_platform_velocity(t, moved.velocity[i])
     warmth, weight = recording.temperature, recording.pressure
     if warmth is not None:
         yield warmth.time, lambda i, t: watch.add_air(t, temperature=float(warmth.value[i]))

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.motion import velocity_at
 from wind_sensors.station.model import Rotor, Station
 from wind_sensors.station.signals import (
     Angles,
@@ -17,6 +18,7 @@ from wind_sensors.station.signals import (
     Recording,
     Series,
     TimeArray,
+    Velocities,
     Winds,
 )
 
@@ -32,6 +34,7 @@ LONGEST_GAP = 1.0
 """Between two readings of the reference it is not interpolated [s]."""
 
 _PLATFORM = ("platform", "")
+_VELOCITY = ("platform", "velocity")
 _TEMPERATURE = ("air", "temperature")
 _PRESSURE = ("air", "pressure")
 _WIND = ("reference", "")
@@ -61,6 +64,10 @@ class SignalStore:
     def add_platform(self, time: int, state: Sequence[float]) -> None:
         """Attitude, velocity, angular rate and position, 13 numbers."""
         self._samples[_PLATFORM].append((time, *state))
+
+    def add_platform_velocity(self, time: int, velocity: Sequence[float]) -> None:
+        """Velocity that comes apart from the attitude [m/s], instead of the states'."""
+        self._samples[_VELOCITY].append((time, *velocity))
 
     def add_temperature(self, time: int, value: float) -> None:
         """[deg C]"""
@@ -167,11 +174,7 @@ class SignalStore:
                 pulses[name] = Pulses(found.time, turns if counted else None)
             elif kind == "angles":
                 angles[name] = Angles(found.time, found.values[:, 0])
-        platform = None
-        states = self._array(_PLATFORM, start - 20 * GRID_STEP, stop + 20 * GRID_STEP)
-        if states is not None and station.platform is not None:
-            v = states.values
-            platform = PlatformStates(states.time, v[:, :4], v[:, 4:7], v[:, 7:10], v[:, 10:13])
+        platform, platform_velocity = self._motion(station, start, stop)
         return Recording(
             name="watch",
             station=station,
@@ -181,9 +184,30 @@ class SignalStore:
             angles=angles,
             reference=wind,
             platform=platform,
+            platform_velocity=platform_velocity,
             temperature=self._series(_TEMPERATURE, start, stop),
             pressure=self._series(_PRESSURE, start, stop),
         )
+
+    def _motion(
+        self, station: Station, start: int, stop: int
+    ) -> tuple[PlatformStates | None, Velocities | None]:
+        """States around an interval, and the velocities where they come apart."""
+        early, late = start - 20 * GRID_STEP, stop + 20 * GRID_STEP
+        states = self._array(_PLATFORM, early, late)
+        if states is None or station.platform is None:
+            return None, None
+        v, told = states.values, None
+        velocity = v[:, 4:7]
+        if station.platform.moves_apart:
+            found = self._array(_VELOCITY, early, late)
+            told = (
+                Velocities(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+                if found is None
+                else Velocities(found.time, found.values)
+            )
+            velocity = velocity_at(told, states.time)
+        return PlatformStates(states.time, v[:, :4], velocity, v[:, 7:10], v[:, 10:13]), told
 
     def _series(self, key: tuple[str, str], start: int, stop: int) -> Series | None:
         found = self._array(key, start - 60_000_000_000, stop)

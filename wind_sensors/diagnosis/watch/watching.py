@@ -183,17 +183,32 @@ class Watch:
         self,
         time_ns: int,
         attitude_xyzw: npt.ArrayLike,
-        velocity: npt.ArrayLike,
+        velocity: npt.ArrayLike | None,
         angular_rate: npt.ArrayLike,
         position: npt.ArrayLike,
     ) -> None:
-        """State of the carrier, as in `PlatformStates`."""
-        parts = (attitude_xyzw, velocity, angular_rate, position)
+        """State of the carrier, as in `PlatformStates`; the velocity is None where it comes apart.
+        """
+        platform = self.station.platform
+        if velocity is not None and platform is not None and platform.moves_apart:
+            self.add_platform_velocity(time_ns, velocity)
+            velocity = None
+        told = np.zeros(3) if velocity is None else velocity
+        parts = (attitude_xyzw, told, angular_rate, position)
         state = np.concatenate([np.asarray(p, dtype=np.float64) for p in parts])
         if np.isfinite(state).all():
             self._store.add_platform(time_ns, state.tolist())
         if self._estimator is not None:
-            self._estimator.add_platform(time_ns, *parts)
+            self._estimator.add_platform(time_ns, attitude_xyzw, velocity, angular_rate, position)
+            self._take_estimates()
+
+    def add_platform_velocity(self, time_ns: int, velocity: npt.ArrayLike) -> None:
+        """Velocity of the carrier where it comes apart from the attitude [m/s]."""
+        vector = np.asarray(velocity, dtype=np.float64)
+        if np.isfinite(vector).all():
+            self._store.add_platform_velocity(time_ns, vector.tolist())
+        if self._estimator is not None:
+            self._estimator.add_platform_velocity(time_ns, vector)
             self._take_estimates()
 
     def add_air(
