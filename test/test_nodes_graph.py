@@ -122,7 +122,8 @@ def _offline_simulation(station_name: str, start: int) -> Recording:
 
 
 @pytest.mark.parametrize(
-    "station", ["mast_cup_vane", "mast_propeller_vane", "usv", "propeller_array", "bivane"]
+    "station",
+    ["mast_cup_vane", "mast_propeller_vane", "usv", "multirotor", "propeller_array", "bivane"],
 )
 def test_live_equals_offline_to_the_bit(graph: Graph, tmp_path: Path, station: str) -> None:
     run = LiveRun(graph, tmp_path / "recording", station)

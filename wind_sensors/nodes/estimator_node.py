@@ -28,6 +28,7 @@ from wind_sensors.nodes.diagnostics import Level, Status, Updater
 from wind_sensors.nodes.estimator_parameters import NODE_PARAMETERS
 from wind_sensors.nodes.inputs import EstimatorInputs
 from wind_sensors.nodes.mounting import MountingFromTf, SensorPose, tf2_is_installed
+from wind_sensors.nodes.odometry_claims import claims_of, odometry_status
 from wind_sensors.nodes.outputs import TOPICS, WindPublishers
 from wind_sensors.nodes.parameters import (
     Parameter,
@@ -283,6 +284,13 @@ class EstimatorNode(Node):
         )
         if self.station.platform is not None:
             yield self._mounting_status()
+        if self._inputs.odometry is not None:
+            yield odometry_status(
+                claims_of(self._inputs.odometry),
+                self.station,
+                self._outputs.frame_id,
+                self._outputs.body_frame_id,
+            )
 
     def _mounting_status(self) -> Status:
         platform = self.station.platform

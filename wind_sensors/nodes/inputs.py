@@ -136,6 +136,7 @@ class EstimatorInputs:
     Attributes:
         estimator: Gets the measurements; may be replaced at any time.
         counts: By topic.
+        odometry: The latest message of the platform's odometry; None before it.
         instruments: Topics of rotors and vanes.
         event_driven: Topics with edges, of which a rotor at rest sends none.
 
@@ -148,6 +149,7 @@ class EstimatorInputs:
     ) -> None:
         self.estimator = estimator
         self.counts: dict[str, TopicCount] = defaultdict(TopicCount)
+        self.odometry: Any = None
         self.instruments: set[str] = set()
         self.event_driven: set[str] = set()
         self._now = now
@@ -325,6 +327,7 @@ class EstimatorInputs:
         count = self.counts[source.topic]
 
         def odometry(message: Any, stamp: int) -> None:
+            self.odometry = message
             state = odometry_state(message, stamp or self._now())
             if state is None:
                 count.not_numbers += 1
