@@ -17,6 +17,7 @@ from nodes_harness import Graph, overrides, stamps_and_velocities, status, value
 
 from wind_sensors.estimation import EstimatorSettings
 from wind_sensors.estimation.processing import process
+from wind_sensors.nodes.diagnostics import Level
 from wind_sensors.nodes.estimator_node import EstimatorNode
 from wind_sensors.nodes.kinds import CUP_VANE, kind_for
 from wind_sensors.nodes.player import PlayerNode
@@ -128,6 +129,13 @@ def _offline_simulation(station_name: str, start: int) -> Recording:
 def test_live_equals_offline_to_the_bit(graph: Graph, tmp_path: Path, station: str) -> None:
     run = LiveRun(graph, tmp_path / "recording", station)
     run.assert_live_equals_offline()
+    # Names of joints, frames and noises of the ready stations contradict nothing.
+    names = {s.name: s for s in [*run.estimator._health(), *run.estimator._topics.statuses()]}
+    assert ("odometry" in names) == (station == "usv")
+    for name, found in names.items():
+        if name == "odometry" or name.startswith("topic"):
+            # The run is over, and the clock of the simulation has gone.
+            assert found.level == Level.OK or "Silent" in found.message, found.message
 
 
 def test_listeners_that_cannot_follow_make_the_run_slower_and_not_different(

@@ -14,7 +14,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import FluidPressure, Imu, Temperature
+from sensor_msgs.msg import FluidPressure, Imu, JointState, Temperature
 from std_msgs.msg import Float32, Float64MultiArray, Header, Int64
 
 from wind_sensors.errors import UserError
@@ -156,6 +156,41 @@ def test_a_bivane_on_one_topic_delivers_azimuth_and_elevation(tmp_path: Path) ->
         angles = [angle for _, angle in heard.angles[name]]
         np.testing.assert_array_equal(angles, offline.angles[name].angle)
     assert np.std([angle for _, angle in heard.angles["bivane/elevation"]]) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("names", "field", "doubt"),
+    [
+        (["vane"], "", ""),
+        (["", ""], "", ""),
+        (["masthead_joint", "rudder"], "", ""),
+        (["wind_vane", "rudder"], "", ""),
+        (["rudder", "Vane"], "", "state `field: position[1]`"),
+        (["rudder", "Vane"], "position[1]", ""),
+        (["rudder", "mast"], "", "none looks like 'masthead'"),
+        (["rudder", "mast"], "position[1]", ""),
+        (["masthead", "rudder"], "position[1]", "state `field: position[0]`"),
+    ],
+)
+def test_a_joint_that_is_not_the_vane_is_told_live_and_offline(
+    tmp_path: Path, names: list[str], field: str, doubt: str
+) -> None:
+    vane = VANE.replace("name: vane", "name: masthead")
+    source = f"{{topic: /v, field: '{field}'}}" if field else "/v"
+    station = _station(tmp_path, CUP % "/p", vane % source)
+    heard: Any = Collector()
+    inputs = EstimatorInputs(station, heard, lambda: 5)
+    receive = {source.topic: source.receive for source in inputs.sources()}
+    message = JointState(name=names, position=[0.7] * len(names))
+    for _ in range(2):
+        receive["/v"](message)
+    status = _statuses(inputs)["topic /v"]
+    assert status.level == (Level.WARN if doubt else Level.OK)
+    assert doubt in status.message
+    assert len(heard.angles["masthead"]) == 2
+    data = TopicData("sensor_msgs/msg/JointState", [10**9], [serialize_message(message)])
+    offline = signals_of(BagContent({"/v": data}, typestore()), station, "test", "test")
+    assert any("is the joint" in note for note in offline.notes) == bool(doubt)
 
 
 def test_odometry_arrives_as_in_a_recording(tmp_path: Path) -> None:

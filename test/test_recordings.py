@@ -19,8 +19,10 @@ from wind_sensors.station.model import (
 )
 from wind_sensors.station.signals import (
     Angles,
+    PlatformStates,
     Pulses,
     Recording,
+    Velocities,
 )
 
 
@@ -58,11 +60,62 @@ def test_an_imu_with_a_twist_makes_the_same_platform(tmp_path: Path) -> None:
         "r", station, recording.start, recording.stop, recording.pulses,
         platform=recording.platform,
     )
-    after = read_recording(write_recording(tmp_path / "r", moved)).platform
+    found = read_recording(write_recording(tmp_path / "r", moved))
+    after = found.platform
     assert after is not None and moved.platform is not None
     assert np.allclose(after.velocity, moved.platform.velocity, atol=1e-9)
     assert np.array_equal(after.angular_rate, moved.platform.angular_rate)
     assert not after.position.any()
+    assert found.platform_velocity is not None
+    assert np.array_equal(found.platform_velocity.time, moved.platform.time)
+    assert np.array_equal(found.platform_velocity.velocity, moved.platform.velocity)
+
+
+def test_a_velocity_at_times_of_its_own_comes_back_and_is_not_stretched_over_gaps(
+    tmp_path: Path,
+) -> None:
+    recording = full_recording(np.random.default_rng(1))
+    states = recording.platform
+    assert states is not None
+    platform = Platform(imu=Input(topic="/imu"), twist=Input(topic="/velocity"))
+    station = recording.station.model_copy(update={"platform": platform})
+    second = 10**9
+    start = int(states.time[0])
+    time = start + np.array([0, 1, 6], dtype=np.int64) * second
+    velocity = np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [5.0, 0.0, np.pi]])
+    at = start + np.array([0, 500, 1400, 1600, 3000, 5600, 6000]) * 10**6
+    few = PlatformStates(
+        at, states.attitude[:7], np.full((7, 3), np.nan), states.angular_rate[:7], np.zeros((7, 3))
+    )
+    before = Recording(
+        "r", station, recording.start, recording.stop, recording.pulses, platform=few,
+        platform_velocity=Velocities(time, velocity),
+    )
+    after = read_recording(write_recording(tmp_path / "r", before))
+    assert after.platform is not None and after.platform_velocity is not None
+    assert np.array_equal(after.platform_velocity.time, time)
+    assert np.array_equal(after.platform_velocity.velocity, velocity)
+    assert np.array_equal(after.platform.time, at)
+    # The five seconds between the last two velocities are known of neither.
+    np.testing.assert_allclose(
+        after.platform.velocity[:, 0], [1.0, 2.0, np.nan, np.nan, np.nan, np.nan, 5.0]
+    )
+
+
+def test_an_imu_whose_velocity_is_not_in_the_bag_has_none_and_says_so(tmp_path: Path) -> None:
+    recording = full_recording(np.random.default_rng(1))
+    states = recording.platform
+    assert states is not None
+    platform = Platform(imu=Input(topic="/imu"), twist=Input(topic="/velocity"))
+    station = recording.station.model_copy(update={"platform": platform})
+    nothing = Velocities(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    before = Recording(
+        "r", station, recording.start, recording.stop, recording.pulses, platform=states,
+        platform_velocity=nothing,
+    )
+    after = read_recording(write_recording(tmp_path / "r", before))
+    assert after.platform is not None and np.isnan(after.platform.velocity).all()
+    assert "/velocity: no messages (the platform)" in after.notes
 
 
 @pytest.mark.parametrize(

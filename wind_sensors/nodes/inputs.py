@@ -27,6 +27,7 @@ from wind_sensors.station.inputs import (
     field_path,
     field_value,
     is_plausible,
+    joint_doubt,
     resolved,
     scaled,
     tells_orientation,
@@ -61,6 +62,7 @@ class TopicCount:
         without_stamp, not_numbers, without_orientation, implausible, unusable: What was left out,
             and why.
         problem: Of the last unusable one.
+        doubts: Of which joint a signal is read, by signal.
         restarts: How often a counter began anew from zero; its turns go on.
         purposes: What the messages are for.
     """
@@ -72,6 +74,7 @@ class TopicCount:
     implausible: int = 0
     unusable: int = 0
     problem: str = ""
+    doubts: dict[str, str] = field(default_factory=dict)
     restarts: int = 0
     purposes: list[str] = field(default_factory=list)
 
@@ -199,6 +202,7 @@ class EstimatorInputs:
             if isinstance(instrument, (Cup, Propeller)):
                 source = resolved(instrument.pulses, "pulses")
                 self._add(source, f"pulses of {instrument.name}", self._rotor(source, instrument))
+                self._watch_joints(source, instrument.name, instrument.kind)
                 self.instruments.add(source.topic)
                 if source.meaning in ("edge", "edges"):
                     self.event_driven.add(source.topic)
@@ -206,6 +210,21 @@ class EstimatorInputs:
                 for signal, source in angle_inputs(instrument).items():
                     self.instruments.add(source.topic)
                     self._add(source, f"angle of {signal}", self._angle(source, signal))
+                    self._watch_joints(source, signal, instrument.kind)
+
+    def _watch_joints(self, source: Input, signal: str, kind: str) -> None:
+        """Doubt a place among several joints; looked at again only where their names change."""
+        if source.type != "sensor_msgs/msg/JointState":
+            return
+        doubts = self.counts[source.topic].doubts
+        known: list[list[str]] = [[]]
+
+        def joints(message: Any, stamp: int) -> None:
+            if message.name != known[0]:
+                known[0] = list(message.name)
+                doubts[signal] = joint_doubt(source, signal, kind, known[0])
+
+        self._handlers[source.topic].append(joints)
 
     def _rotor(self, source: Input, rotor: Cup | Propeller) -> Handler:
         path = _checked_path(source)

@@ -192,6 +192,9 @@ class TopicHealth:
                 f"{', '.join(complaints)} of {topic.recent('received', now)} messages within the "
                 f"last {MEMORY} s were left out."
             )
+        doubts = [doubt for doubt in count.doubts.values() if doubt]
+        if doubts:
+            return Level.WARN, " ".join(doubts)
         return Level.OK, "Messages are arriving."
 
 

@@ -69,10 +69,10 @@ class _Walk:
             for name, child in self.types.fielddefs[detail][1]:
                 if name == path[0]:
                     return self.find(child, path[1:])
-                self._skip(child)
+                self.skip(child)
             raise _FieldAbsent
         child, size = detail
-        count = size if kind == Nodetype.ARRAY else self._length()
+        count = size if kind == Nodetype.ARRAY else self.length()
         if not path:
             code = _CODES[child[1][0]]
             if count:
@@ -88,7 +88,8 @@ class _Walk:
         size = int(code[1])
         self.position += -(self.position - _ENCAPSULATION) % size
 
-    def _length(self) -> int:
+    def length(self) -> int:
+        """The length word at the position, which moves behind it."""
         self._align("u4")
         try:
             (value,) = struct.unpack_from(f"{self.order}I", self.data, self.position)
@@ -98,21 +99,22 @@ class _Walk:
         self.position += 4
         return int(value)
 
-    def _skip(self, node: Any) -> None:
+    def skip(self, node: Any) -> None:
+        """Move behind what stands at the position."""
         kind, detail = node
         if kind == Nodetype.BASE:
             if detail[0] in {"string", "wstring"}:
-                size = self._length()
+                size = self.length()
                 self.position += size
             else:
                 self._align(_CODES[detail[0]])
                 self.position += int(_CODES[detail[0]][1])
         elif kind == Nodetype.NAME:
             for _, child in self.types.fielddefs[detail][1]:
-                self._skip(child)
+                self.skip(child)
         else:
             child, size = detail
-            self._skip_items(child, size if kind == Nodetype.ARRAY else self._length())
+            self._skip_items(child, size if kind == Nodetype.ARRAY else self.length())
 
     def _skip_items(self, node: Any, count: int) -> None:
         kind, detail = node
@@ -123,7 +125,7 @@ class _Walk:
             self.position += int(code[1]) * count
             return
         for _ in range(min(count, len(self.data))):
-            self._skip(node)
+            self.skip(node)
 
 
 def leaf(types: Typestore, message_type: str, path: FieldPath) -> str:
@@ -228,6 +230,27 @@ def batches(
             items = times
         found.append(items.astype(np.int64))
     return found, lost
+
+
+def texts(data: bytes, types: Typestore, message_type: str, field_name: str) -> list[str]:
+    """The strings of one message's array of strings; none where the message ends before it."""
+    if len(data) <= _ENCAPSULATION:
+        return []
+    walk = _Walk(types, data, _order(data))
+    found = []
+    try:
+        for name, node in types.fielddefs[message_type][1]:
+            if name == field_name:
+                break
+            walk.skip(node)
+        for _ in range(walk.length()):
+            size = walk.length()
+            text = data[walk.position : walk.position + size]
+            found.append(text.rstrip(b"\0").decode("utf-8", "replace"))
+            walk.position += size
+    except _FieldAbsent:
+        return []
+    return found
 
 
 def _order(data: bytes) -> str:

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from wind_sensors.errors import UserError
 from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
-from wind_sensors.recordings.fields import batches, columns, leaf, stamps
+from wind_sensors.recordings.fields import batches, columns, leaf, stamps, texts
 from wind_sensors.recordings.file_order import SET_BACK
 from wind_sensors.recordings.platform import platform_states
 from wind_sensors.recordings.plausible import impossible, impossible_note, stray_note, strays
@@ -29,6 +29,7 @@ from wind_sensors.station.inputs import (
     angles_from_raw,
     field_path,
     is_plausible,
+    joint_doubt,
     resolved,
     scaled,
     turns_from_raw,
@@ -213,7 +214,7 @@ def signals_of(content: BagContent, station: Station, name: str, where: str) -> 
                 pulses[instrument.name] = rotor_pulses
         else:
             for signal, source in angle_inputs(instrument).items():
-                readings = reader.angles(signal, source)
+                readings = reader.angles(signal, source, instrument.kind)
                 if readings is not None:
                     angles[signal] = readings
     reference = reader.winds(station.reference.topic) if station.reference else None
@@ -275,6 +276,7 @@ class _SignalReader:
             time = time[self._near(source.topic, time)]
             self._note_order(source.topic, time)
             return Pulses(time)
+        self._doubt_joint(source, data, rotor.name, rotor.kind)
         time, raw = self._numbers(source, data, path)
         counted = turns_from_raw(source, rotor, time.tolist(), raw.tolist())
         if counted.restarts:
@@ -292,12 +294,21 @@ class _SignalReader:
             )
         return Pulses(time, counted.turns)
 
-    def angles(self, signal: str, source: Input) -> Angles | None:
+    def angles(self, signal: str, source: Input, kind: str) -> Angles | None:
         data = self._topic(source, f"the angle of '{signal}'")
         if data is None:
             return None
+        self._doubt_joint(source, data, signal, kind)
         time, raw = self._numbers(source, data, field_path(source.field))
         return Angles(time, angles_from_raw(source, raw))
+
+    def _doubt_joint(self, source: Input, data: TopicData, signal: str, kind: str) -> None:
+        """Note where the first message's joints have other names than what is read of them."""
+        if source.type == "sensor_msgs/msg/JointState":
+            names = texts(data.raw[0], self.content.types, source.type, "name")
+            doubt = joint_doubt(source, signal, kind, names)
+            if doubt:
+                self.notes.append(doubt)
 
     def series(self, stated: Input | None, signal: Signal) -> Series | None:
         if stated is None:

@@ -7,7 +7,7 @@ a recording (whole arrays) turn the same messages into the same bits.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -143,6 +143,42 @@ def tells_orientation(first_covariance: npt.ArrayLike) -> npt.NDArray[np.bool_]:
             devices without an orientation.
     """
     return np.asarray(np.asarray(first_covariance, dtype=np.float64) >= 0.0, dtype=np.bool_)
+
+
+def joint_doubt(source: Input, signal: str, kind: str, names: Sequence[str]) -> str:
+    """Why a sensor_msgs/JointState may be read at another joint than the instrument's.
+
+    A joint is the instrument's if its name contains the instrument's name, its kind, or for a
+    bivane `azimuth` or `elevation`. A place that the station file states is believed unless
+    another joint is the instrument's.
+
+    Args:
+        source: The input, resolved; its place is the index of its field.
+        signal: Name of the signal, `<instrument>` or `<bivane>/elevation`.
+        kind: Of the instrument.
+        names: Of the message's joints.
+
+    Returns:
+        A sentence with what to do; empty where there is no doubt.
+    """
+    place = field_path(source.field)[-1]
+    if not isinstance(place, int) or len(names) < 2 or place >= len(names) or not any(names):
+        return ""
+    instrument, _, part = signal.partition("/")
+    words = [part] if part else [instrument, kind, *(["azimuth"] if kind == "bivane" else [])]
+    own = [any(word.lower() in name.lower() for word in words) for name in names]
+    if own[place] or (place > 0 and not any(own)):
+        return ""
+    read = f"{source.field} of {source.topic} is the joint {names[place]}"
+    if any(own):
+        right = own.index(True)
+        return (
+            f"{read}, but {names[right]} looks like '{signal}': state `field: position[{right}]`."
+        )
+    return (
+        f"{read}, one of {', '.join(names)}, and none looks like '{signal}': state `field`, or "
+        "give the instrument its joint's name."
+    )
 
 
 def field_path(field: str) -> FieldPath:
