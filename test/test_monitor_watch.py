@@ -241,3 +241,22 @@ def test_settings_that_do_not_fit_are_refused() -> None:
         WatchSettings(drive="instruments")
     with pytest.raises(UserError, match="no instrument 'cup2'"):
         Watch(station(), WatchSettings(drive="instruments", driving=("cup2",)))
+
+
+def test_a_velocity_that_comes_apart_is_kept_apart_and_known_where_it_was_told() -> None:
+    station = load_station("multirotor")
+    kept = store.SignalStore()
+    second = 10**9
+    for time in range(0, 10 * second + 1, second):
+        kept.add_platform(time, [0.0, 0.0, 0.0, 1.0, *[0.0] * 9])
+        kept.add_wind(time, [5.0, 0.0, 0.0])
+    for time in (0, 1, 2, 8, 10):
+        kept.add_platform_velocity(time * second, [float(time), 0.0, 0.0])
+    found = kept.recording(station, 0, 0, 10 * second)
+    assert found is not None and found.platform is not None
+    assert found.platform_velocity is not None
+    assert found.platform_velocity.time.tolist() == [t * second for t in (0, 1, 2, 8, 10)]
+    nan = np.nan
+    np.testing.assert_allclose(
+        found.platform.velocity[:, 0], [0, 1, 2, nan, nan, nan, nan, nan, 8, 9, 10]
+    )

@@ -36,7 +36,8 @@ SETTINGS: tuple[Parameter, ...] = (
         "smoother_lag",
         float,
         _DEFAULTS.smoother_lag,
-        "How much later data may still improve an estimate [s]; the estimate is late by this.",
+        "How much later data may still improve an estimate [s]; on average an estimate comes late "
+        "by 1.25 times this and by reordering_window.",
         minimum=0.05,
         maximum=600.0,
         changeable=True,

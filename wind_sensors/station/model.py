@@ -422,7 +422,8 @@ class Platform(Entry):
     imu: Input | None = None
     """Topic of attitude and angular rate (sensor_msgs/Imu), instead of odometry."""
     twist: Input | None = None
-    """Topic of the velocity (geometry_msgs/TwistStamped), with `imu`."""
+    """Topic of the velocity (geometry_msgs/TwistStamped), with `imu`; without it the platform is
+    taken to turn but not to travel."""
     sensor_position: Vector3 = (0.0, 0.0, 0.0)
     """Sensor in the platform's frame (x forward, y left, z up) [m]."""
     sensor_rotation_deg: Vector3 = (0.0, 0.0, 0.0)
@@ -452,9 +453,10 @@ class Platform(Entry):
     """Magnetic north minus true north, positive to the east; unset it counts as nought, and NMEA
     sentences leave the magnetic direction empty."""
     attitude_noise_deg: NonNegative = 0.5
-    """Standard deviation of the reported attitude."""
+    """Standard deviation of the reported attitude; covariances in the messages do not count."""
     velocity_noise: NonNegative = 0.05
-    """Standard deviation of the reported velocity [m/s]."""
+    """Standard deviation of the reported velocity [m/s]; covariances in the messages do not
+    count."""
     angular_rate_noise_deg: NonNegative = 0.0
     """Standard deviation of the reported angular rate [deg/s]; acts through `sensor_position`."""
     mounting_noise_deg: NonNegative = 0.0
