@@ -113,8 +113,7 @@ class _Places:
 
     @classmethod
     def of(cls, known: TimeArray, wanted: TimeArray) -> _Places:
-        """Places of the instants `wanted` among the sorted times `known`, of which there are some.
-        """
+        """Places of the instants `wanted` among times in order, of which there is one at least."""
         count = known.size
         left = np.clip(np.searchsorted(known, wanted, side="right") - 1, 0, max(count - 2, 0))
         right = np.minimum(left + 1, count - 1)

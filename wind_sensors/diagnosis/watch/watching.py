@@ -187,8 +187,7 @@ class Watch:
         angular_rate: npt.ArrayLike,
         position: npt.ArrayLike,
     ) -> None:
-        """State of the carrier, as in `PlatformStates`; the velocity is None where it comes apart.
-        """
+        """State of the carrier as in `PlatformStates`; without velocity where it comes apart."""
         platform = self.station.platform
         if velocity is not None and platform is not None and platform.moves_apart:
             self.add_platform_velocity(time_ns, velocity)
