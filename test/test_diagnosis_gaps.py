@@ -18,7 +18,7 @@ from wind_sensors.diagnosis.effects.definition import with_effect
 from wind_sensors.diagnosis.explaining.terms import Term
 from wind_sensors.diagnosis.explaining.vane_guesses import vane_guesses
 from wind_sensors.station.model import Angle, Station
-from wind_sensors.station.signals import Angles, Recording
+from wind_sensors.station.signals import Angles, Recording, between_jumps
 
 SECOND = 1_000_000_000
 
@@ -91,6 +91,17 @@ def test_coarse_readings_and_rests_are_no_one_number(step: float) -> None:
     stuck = np.where(np.arange(angle.size) < 1200, 0.2, angle)
     for other in (angle, coarse, sticking, stuck):
         assert not readings(other).at_one_number.any()
+
+
+def test_jumps_a_second_apart_tell_no_edges_of_a_gap() -> None:
+    """As where a logger averages angles on either side of the turn, block by block."""
+    recording = recorded(STATION, 8)
+    time = recording.angles["vane"].time
+    block = (time - time[0]) // SECOND
+    told = with_readings(recording, np.where(block % 2 == 0, 3.0, -0.5))
+    assert told.angles["vane"].erratic.any()
+    assert not between_jumps(told.angles["vane"]).any()
+    assert all(not term.held for term in gaps_of(told))
 
 
 def test_small_numbers_drawn_by_chance_are_told_where_others_are_large() -> None:

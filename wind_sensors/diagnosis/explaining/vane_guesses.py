@@ -198,13 +198,16 @@ def _told_gap(
         reading: What the vane reads there [deg]; None: anything.
 
     Returns:
-        Nothing where the readings beside it are too few in that time to tell its edges.
+        Nothing where none is made in it, or the readings beside it are too few in that time to tell
+        its edges.
     """
     vane = channel.instrument
     readings = comparison.recording.angles[vane]
     degrees, time = np.degrees(readings.angle), comparison.grid.seconds(readings.time)
     other = np.isfinite(degrees) & ~there
     (inside,) = np.nonzero(there)
+    if inside.size == 0:
+        return []
     begin, end = inside[0], inside[-1]
     nose = np.degrees(headings(comparison, channel))[there]
     sector = _around(degrees[begin : end + 1][other[begin : end + 1]], nose, by_chance)
