@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +10,15 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.observation import Grid
-from wind_sensors.station.signals import Recording
+from wind_sensors.station.signals import Angles, Recording
 
 FloatArray = npt.NDArray[np.float64]
 
 LONGEST_GAP = 1.0
 """Where the reference is silent for longer [s], nothing is compared."""
+
+USUAL_GAPS = 5.0
+"""A vane is silent if its readings are so many times as far apart as they usually are."""
 
 BESIDE_GAP = 1.0
 """Nor so close to such a gap [s]."""
@@ -71,6 +75,36 @@ def where_reference_is(recording: Recording, grid: Grid, answering: FloatArray) 
     for k in np.flatnonzero(np.diff(time) > LONGEST_GAP):
         forgetting = FORGETTING * float(np.interp(time[k + 1], grid.centres, answering))
         begin, end = time[k] - BESIDE_GAP, time[k + 1] + max(BESIDE_GAP, forgetting)
+        weight[(grid.centres > begin) & (grid.centres < end)] = 0.0
+    return soft(weight)
+
+
+def silent_spans(readings: Angles, grid: Grid) -> list[tuple[float, float]]:
+    """When a vane says nothing for longer than `LONGEST_GAP` and than is usual for it [s].
+
+    Args:
+        readings: Of the vane; those that are no number say nothing.
+        grid: Bins; before the first and after the last reading it says nothing either.
+    """
+    time = grid.seconds(readings.time[np.isfinite(readings.angle)])
+    at = np.concatenate(([0.0], np.clip(time, 0.0, grid.n * grid.dt), [grid.n * grid.dt]))
+    between = np.diff(at)
+    longest = max(LONGEST_GAP, USUAL_GAPS * float(np.median(between)))
+    return [(float(at[k]), float(at[k + 1])) for k in np.flatnonzero(between > longest)]
+
+
+def where_vanes_tell(spans: Iterable[tuple[float, float]], grid: Grid) -> FloatArray:
+    """Weights that are zero where a vane says nothing, shape (n,).
+
+    What is taken to have been read between two readings is a line, on which a vane would hardly
+    move.
+
+    Args:
+        spans: When [s], of all vanes.
+        grid: Bins.
+    """
+    weight = np.ones(grid.n)
+    for begin, end in spans:
         weight[(grid.centres > begin) & (grid.centres < end)] = 0.0
     return soft(weight)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,12 @@ from scipy.ndimage import uniform_filter1d
 
 from wind_sensors.diagnosis.comparing.activity import counted_segments, segments_of
 from wind_sensors.diagnosis.comparing.comparison import Comparison
-from wind_sensors.diagnosis.comparing.counted_time import where_reference_is, without_repeats
+from wind_sensors.diagnosis.comparing.counted_time import (
+    silent_spans,
+    where_reference_is,
+    where_vanes_tell,
+    without_repeats,
+)
 from wind_sensors.diagnosis.comparing.moving import in_slow_wind
 from wind_sensors.diagnosis.comparing.observation import (
     SERIES_INTERVAL,
@@ -162,9 +168,35 @@ def prepare(
     }
     comparison = replace(comparison, departure=departure)
     followed = where_vanes_follow(beside.values(), comparison.speed, grid)
-    if not known_wind.all() or not followed.all():
-        return comparison.within(known_wind * followed)
-    return comparison.measuring()
+    silent = {
+        c.instrument: silent_spans(recording.angles[c.instrument], grid)
+        for c in channels
+        if c.kind == "vane_angle"
+    }
+    counted = known_wind * followed * where_vanes_tell(chain(*silent.values()), grid)
+    if counted.all():
+        return comparison.measuring()
+    seconds = float(counted.sum()) * grid.dt
+    if seconds < SHORTEST:
+        raise UserError(
+            f"In only {seconds:.0f} s both the reference and the vanes tell something: too little "
+            "to compare anything.",
+            recording.name,
+            f"Record at least {SHORTEST:.0f} s, better 15 minutes.",
+        )
+    notes = (*recording.notes, *(_in_words(name, spans) for name, spans in silent.items() if spans))
+    noted = replace(comparison, recording=replace(comparison.recording, notes=notes))
+    return noted.within(counted)
+
+
+def _in_words(vane: str, spans: Sequence[tuple[float, float]]) -> str:
+    """What is not compared because a vane says nothing, for people."""
+    silent = sum(end - begin for begin, end in spans)
+    begin, end = max(spans, key=lambda span: span[1] - span[0])
+    return (
+        f"{vane}: no readings for {silent:.0f} s, the longest time from {begin:.0f} to {end:.0f} "
+        "s, so that nothing is compared then"
+    )
 
 
 def _debounced(recording: Recording) -> dict[str, Pulses]:

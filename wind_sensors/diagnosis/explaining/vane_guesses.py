@@ -110,24 +110,30 @@ def vane_guesses(comparison: Comparison, channel: Channel, vane: Angle) -> list[
 
 
 def _repeats(comparison: Comparison, vane: Angle) -> list[Term]:
+    """The longest time in which a vane repeats one reading, if it is unusual."""
     readings = comparison.recording.angles[vane.name]
-    time = comparison.grid.seconds(readings.time)
+    told = np.isfinite(readings.angle)
+    time, angle = comparison.grid.seconds(readings.time[told]), readings.angle[told]
     if time.size < 50:
         return []
-    changed = np.flatnonzero(np.abs(np.diff(readings.angle)) > 1e-9) + 1
+    changed = np.flatnonzero(np.abs(np.diff(angle)) > 1e-9) + 1
     starts = np.concatenate(([0], changed))
     stops = np.concatenate((changed, [time.size])) - 1
     lasting = time[stops] - time[starts]
     longest = int(np.argmax(lasting))
-    usual = float(np.quantile(lasting, 0.98))
+    others = np.delete(lasting, longest)
+    usual = float(np.quantile(others, 0.98)) if others.size else 0.0
     if lasting[longest] < max(LONGEST_REPEAT, 4.0 * usual):
         return []
     since = comparison.drive.elapsed
+    begin, end = float(time[starts[longest]]) + since, float(time[stops[longest]]) + since
     return [
         suggested(
             "stuck_sensor", vane.name,
-            start=float(time[starts[longest]]) + since, stop=float(time[stops[longest]]) + since,
-            reading=float(np.degrees(readings.angle[starts[longest]])), known=1.0,
+            # Nothing says that it moved before the first reading or moves after the last one.
+            start=begin if starts[longest] > 0 else -1.0,
+            stop=end if stops[longest] < time.size - 1 else end + 1.0,
+            reading=float(np.degrees(angle[starts[longest]])), known=1.0,
         )
     ]
 
