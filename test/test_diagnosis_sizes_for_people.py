@@ -11,13 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wind_sensors.diagnosis.effects import catalogue
-from wind_sensors.diagnosis.effects.wording import number_text
+from wind_sensors.diagnosis.effects.wording import number_text, parameter_text
 from wind_sensors.diagnosis.explaining.terms import Term
+from wind_sensors.diagnosis.means.findings import too_small
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
+from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.report.corrected_station import corrected_station
 from wind_sensors.report.names import names_of
+from wind_sensors.report.removed import removed_text
 from wind_sensors.report.sizes import sizes_of
 from wind_sensors.station.model import Change, Platform, Station
 from wind_sensors.station.reading import read_station
@@ -144,3 +147,35 @@ def test_a_number_is_told_to_its_digits_without_a_power_of_ten(value: float, dig
 def test_very_large_and_unknown_numbers_are_told_as_such() -> None:
     assert number_text(2.34e7) == "2.34e+07"
     assert number_text(float("nan")) == "?"
+
+
+def test_what_is_not_claimed_counts_bearings_as_the_findings_do() -> None:
+    wake = finding("wake_shadow", bearing_from=Estimate(99.0, 97.0, 101.0, "deg"))
+    (told,) = (size.text for size in sizes_of(wake, STATION))
+    assert told == "wind from 351 deg from north (349 to 353)"
+    effect = wake.term.effect
+    (bearing,) = (p for p in effect.parameters if p.name == "bearing_from")
+    assert parameter_text(bearing, 99.0, STATION) == "wind from 351 deg from north"
+    assert parameter_text(bearing, 90.0, ON_A_BOAT) == "wind from 270 deg from the bow"
+    # Where nothing tells what the x axis points at, the text says how it counts.
+    assert parameter_text(bearing, 99.0).endswith("99 deg counter-clockwise from the x axis")
+    values = {"bearing_from": 99.0, "depth": 0.01, "width": 10.0, "flank": 0.0}
+    assert "(wind from 351 deg from north, depth 0.01," in too_small(
+        Term(effect, "cup", values), STATION
+    )
+
+
+def test_the_sign_of_a_turned_vane_is_told() -> None:
+    turned = finding("vane_offset", offset=Estimate(-8.81, -9.1, -8.5, "deg"))
+    assert sizes_of(turned, STATION)[0].text == (
+        "offset -8.81 deg, counter-clockwise positive (-9.1 to -8.5)"
+    )
+
+
+def test_a_share_of_the_excess_is_not_told_as_one_of_the_misfit() -> None:
+    proof = Proof(2.61, 2.25, 1.93, 0.565, 0.42, 0.65, None, None, None, None)
+    told = removed_text(proof)
+    assert told.startswith("56 % (42 to 65 %) of the excess misfit")
+    assert "residual 2.61 before, 2.25 after, floor 1.93" in told
+    whole = removed_text(replace(proof, floor=0.0))
+    assert "of the whole misfit" in whole and "floor" not in whole

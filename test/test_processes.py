@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from wind_sensors.diagnosis.explaining.signatures import in_parallel
 from wind_sensors.processes import ONE_THREAD, one_thread_of_linear_algebra
 
 TASKS = Path("/proc/self/task")
@@ -31,3 +33,11 @@ def test_what_the_environment_says_is_kept(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
     one_thread_of_linear_algebra()
     assert os.environ["OPENBLAS_NUM_THREADS"] == "3"
+
+
+def test_only_the_first_process_answers_an_interrupt() -> None:
+    def answers(_: int) -> bool:
+        return signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+
+    assert not any(in_parallel(answers, range(4), 2))
+    assert answers(0), "this one still does"

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress, TaskID
 from rich.text import Text
 
 from wind_sensors.cli.baseline import read_healthy
 from wind_sensors.cli.screen import screen
-from wind_sensors.diagnosis.effects.wording import number_text
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
 from wind_sensors.diagnosis.means.healthy import learn_means
@@ -21,6 +19,8 @@ from wind_sensors.errors import UserError
 from wind_sensors.recordings.places import refused_in_words
 from wind_sensors.recordings.reading import read_series
 from wind_sensors.report.outcome_files import write_outcome
+from wind_sensors.report.removed import removed_text
+from wind_sensors.report.sizes import sizes_of
 from wind_sensors.station.model import Rotor
 from wind_sensors.station.signals import Recording, Series
 from wind_sensors.station.silence import silent_instruments
@@ -118,17 +118,10 @@ def print_outcome(console: Console, outcome: Outcome) -> None:
             )
         )
         if f.term.effect.name != "stuck_sensor":
-            for key, e in f.parameters.items():
-                told = number_text(e.value) + ("" if e.unit == "1" else f" {e.unit}")
-                if np.isfinite(e.low):
-                    told += f" ({number_text(e.low)} to {number_text(e.high)})"
-                console.print(f"    {key} {told}")
+            for size in sizes_of(f, outcome.station):
+                console.print(f"    {size.text}")
         if f.proof is not None:
-            console.print(
-                f"    removes {100.0 * f.proof.excess_removed:.0f} % "
-                f"({100.0 * f.proof.low:.0f} to {100.0 * f.proof.high:.0f} %) of the misfit on "
-                "held-out blocks"
-            )
+            console.print(f"    on held-out blocks it removes {removed_text(f.proof)}")
     if outcome.left_over:
         console.print(f"left over: {outcome.left_over}")
     for note in outcome.declined:

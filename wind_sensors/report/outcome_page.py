@@ -16,6 +16,7 @@ from wind_sensors.report import style
 from wind_sensors.report.cuts import in_both_cuts, title_for
 from wind_sensors.report.diagnosis_page import VERDICTS, document, silent_paragraphs
 from wind_sensors.report.names import names_of, silence_of, words
+from wind_sensors.report.removed import removed_text
 from wind_sensors.report.sizes import sizes_of, smallest_text
 from wind_sensors.station.model import Station
 
@@ -81,13 +82,8 @@ def _finding(finding: Finding, station: Station) -> str:
     sizes = "; ".join(size.text for size in sizes_of(finding, station))
     proof = ""
     if finding.proof is not None:
-        p = finding.proof
-        proof = (
-            f"<br>On blocks that were not fitted it removes "
-            f"<b>{100.0 * p.excess_removed:.0f} %</b> "
-            f"({100.0 * p.low:.0f} to {100.0 * p.high:.0f} %) of the misfit that was there; "
-            f"residual {p.before:.2f} before, {p.after:.2f} after, in units of its noise."
-        )
+        removed = escape(removed_text(finding.proof))
+        proof = f"<br>On blocks that were not fitted it removes {removed}."
     return (
         f"<p><b>{escape(finding.term.instrument)}</b>{together}: {escape(sizes)}.<br>"
         f"Where: {escape(located.region.label)}{mismatch}{chance}.{proof}</p>"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
-from wind_sensors.diagnosis.effects.wording import number_text
+from wind_sensors.diagnosis.effects.wording import BEARING, clockwise, counted_from, number_text
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.report.names import words
 from wind_sensors.station.model import Station
@@ -54,34 +54,33 @@ def sizes_of(finding: Finding, station: Station) -> list[Size]:
         for p in finding.term.effect.parameters
         if p.value_from == "forms" and (p.low, p.high) == (0.0, 1.0)
     }
+    senses = {p.name: p.sense for p in finding.term.effect.parameters}
     return [
         Size(words(name), "yes" if e.value == 1.0 else "no", "", "", "")
         if name in either_or
-        else _size(name, e, station)
+        else _size(name, e, station, senses.get(name, ""))
         for name, e in finding.parameters.items()
     ]
 
 
-def _size(name: str, e: Estimate, station: Station) -> Size:
-    if name == "bearing_from":
+def _size(name: str, e: Estimate, station: Station, sense: str) -> Size:
+    if name == BEARING:
         return _bearing(e, station)
     known = np.isfinite(e.low)
     if e.unit == "s" and abs(e.value) > LONG:
         ends = (f"{e.low / DAY:.2f}", f"{e.high / DAY:.2f}") if known else ("", "")
         return Size(words(name), f"{e.value / DAY:.2f}", *ends, "days after the first mean")
     ends = (number_text(e.low), number_text(e.high)) if known else ("", "")
-    return Size(words(name), number_text(e.value), *ends, "" if e.unit == "1" else e.unit)
+    unit = "" if e.unit == "1" else e.unit
+    return Size(words(name), number_text(e.value), *ends, f"{unit}, {sense}" if sense else unit)
 
 
 def _bearing(e: Estimate, station: Station) -> Size:
-    """A bearing clockwise, as winds are told; files count counter-clockwise from the x axis."""
-    on_mast = station.platform is None
-    start = 90.0 if station.platform is None else -station.platform.sensor_rotation_deg[2]
+    """A bearing clockwise, as winds are told."""
 
-    def clockwise(value: float) -> str:
-        return f"{(start - value) % 360.0:.0f}" if np.isfinite(value) else ""
+    def told(value: float) -> str:
+        return f"{clockwise(value, station):.0f}" if np.isfinite(value) else ""
 
     return Size(
-        "wind from", clockwise(e.value), clockwise(e.high), clockwise(e.low),
-        "deg from north" if on_mast else "deg from the bow",
+        "wind from", told(e.value), told(e.high), told(e.low), f"deg {counted_from(station)}"
     )

@@ -45,6 +45,7 @@ class Parameter:
         value_from: The `fit`; the `signals`, which tell it better than a fit can; or several
             `forms` of the effect, each of which is tried as it is.
         told_to: Standard error where the signals tell it.
+        sense: What a positive value means, for people; empty where the name says it.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Parameter:
     tied: float | None = None
     value_from: Literal["fit", "signals", "forms"] = "fit"
     told_to: float = 0.0
+    sense: str = ""
 
     def is_free(self, drive: Drive) -> bool:
         """Whether what drives a recording lets it be fitted."""

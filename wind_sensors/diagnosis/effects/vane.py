@@ -228,7 +228,8 @@ VANE_OFFSET = Effect(
     region="all directions and speeds alike",
     parameters=(
         Parameter(
-            "offset", "deg", -200.0, 200.0, minimum=1.0, step=0.3, starts=(90.0, -90.0, 180.0)
+            "offset", "deg", -200.0, 200.0, minimum=1.0, step=0.3, starts=(90.0, -90.0, 180.0),
+            sense="counter-clockwise positive",
         ),
     ),
     applies=is_vane,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
@@ -188,7 +189,9 @@ def in_parallel(
         order.sort(key=lambda index: -work(items[index]))
     _TASK.append((function, items))
     try:
-        with multiprocessing.get_context("fork").Pool(workers) as pool:
+        # Ctrl-C goes to all of them: only this process answers, by ending the others.
+        ignore = (signal.SIGINT, signal.SIG_IGN)
+        with multiprocessing.get_context("fork").Pool(workers, signal.signal, ignore) as pool:
             for result in pool.imap(_run, order):
                 out.append(result)
                 if progress:

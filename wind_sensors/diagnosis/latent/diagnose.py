@@ -114,7 +114,7 @@ def diagnose_latent(
     if verdict == "none" and turning < FEWEST_TURNING:
         verdict = "inconclusive"
     to_plant, notes = _with_whole_motion(bench, explained, findings)
-    small = [too_small(t) for t in explained.terms if t.relative_size < 1.0]
+    small = [too_small(t, station) for t in explained.terms if t.relative_size < 1.0]
     after = planted(station, explained.terms)
     return Outcome(
         recording=recording.name,
@@ -255,6 +255,7 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
         values = ", ".join(
             f"{p.name.replace('_', ' ')} {best.values[p.name]:.2f} "
             f"({limits[p.name][0]:.2f} to {limits[p.name][1]:.2f}) {p.unit}".removesuffix(" 1")
+            + (f", {p.sense}" if p.sense else "")
             for p in effect.parameters
         )
         share = 100.0 * share_removed(gain, base, np.zeros(base.size))

@@ -10,7 +10,12 @@ from scipy import stats
 
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
-from wind_sensors.diagnosis.effects.wording import parameter_text
+from wind_sensors.diagnosis.effects.wording import (
+    BEARING,
+    clockwise,
+    counted_from,
+    parameter_text,
+)
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
 from wind_sensors.diagnosis.means.averages import DAY, Averages
 from wind_sensors.diagnosis.means.bench import Bench, FloatArray, block_sums, halves, huber
@@ -24,6 +29,7 @@ from wind_sensors.diagnosis.means.silences import COLD, WARM, Ice, Silence
 from wind_sensors.diagnosis.means.vanes import VaneBench, VaneStanding
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding, Unexplained
 from wind_sensors.diagnosis.regions import Found, Region
+from wind_sensors.station.model import Station
 
 UNTOLD = float("nan")
 """Stands for a number that nobody computed."""
@@ -95,24 +101,22 @@ def _estimates(term: Term, limits: dict[str, tuple[float, float]]) -> dict[str, 
     return out
 
 
-def _from_north(heading_deg: float) -> float:
-    return (90.0 - heading_deg) % 360.0
-
-
 def _place(work: PairWork, term: Term, before: FloatArray) -> Found:
     """Where a term of a pair acts, and how large the mismatch is there."""
     pair = work.pair
     channel = f"{term.instrument}/mean_speed"
     speed = pair.wind(work.bench.station)
     sign = 1.0 if term.instrument == pair.second else -1.0
-    if "bearing_from" in term.values:
-        from_north = _from_north(term.values["bearing_from"])
+    if BEARING in term.values:
+        station = work.bench.station
+        centre = clockwise(term.values[BEARING], station)
         width = 2.0 * term.values["width"]
-        away = np.degrees(pair.heading) - term.values["bearing_from"]
+        away = np.degrees(pair.heading) - term.values[BEARING]
         inside = np.abs((away + 180.0) % 360.0 - 180.0) < width
-        low, high = (from_north - width) % 360.0, (from_north + width) % 360.0
+        low, high = (centre - width) % 360.0, (centre + width) % 360.0
         region = Region(
-            channel, "direction", low, high, f"wind from {low:.0f} to {high:.0f} degrees"
+            channel, "direction", low, high,
+            f"wind from {low:.0f} to {high:.0f} deg {counted_from(station)}",
         )
     elif term.interval != ALWAYS:
         begin, end = term.interval
@@ -156,7 +160,7 @@ def findings_of_pair(
             bench.everything,
         )
         if term.relative_size < 1.0:
-            notes.append(f"{work.pair.name}: {too_small(term)}")
+            notes.append(f"{work.pair.name}: {too_small(term, bench.station)}")
             continue
         equal = [
             (t, b) for t, b in named.equal
@@ -213,9 +217,11 @@ def _left(work: PairWork, floor: FloatArray) -> Unexplained:
     return Unexplained(p, share, (), text)
 
 
-def too_small(term: Term) -> str:
+def too_small(term: Term, station: Station) -> str:
     """Why a term that explains held-out blocks is not named, for people."""
-    values = ", ".join(parameter_text(p, term.values[p.name]) for p in term.effect.parameters)
+    values = ", ".join(
+        parameter_text(p, term.values[p.name], station) for p in term.effect.parameters
+    )
     return (
         f"{term.effect.name.replace('_', ' ')} of {term.instrument} ({values}) improves held-out "
         "blocks, but is smaller than what is worth reporting."
@@ -230,7 +236,8 @@ def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
     term = Term(catalogue()["stuck_sensor"], silence.sensor, {"start": begin, "stop": end})
     is_rotor = silence.sensor in averages.speed
     shown = f"{silence.value:.3g} m/s" if is_rotor else (
-        f"{_from_north(np.degrees(silence.value)):.1f} deg"
+        f"{clockwise(np.degrees(silence.value), averages.station):.1f} deg "
+        f"{counted_from(averages.station)}"
     )
     region = Region(
         f"{silence.sensor}/{'mean_speed' if is_rotor else 'mean_direction'}", "time", begin, end,
