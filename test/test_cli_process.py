@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pytest
 from test_cli import steady_recording
+from test_output_topics import window
 
 from wind_sensors.cli.main import main
+from wind_sensors.estimation.bias_terms import WindowTurbulence, array_terms
+from wind_sensors.estimation.core import SmallScales
 from wind_sensors.recordings import write_recording
+from wind_sensors.report.window_table import bias_quantities, wind_quantities
 
 NAIVE = ("--method", "naive", "--window", "60")
 
@@ -51,4 +55,28 @@ def test_windows_are_a_table_for_spreadsheets(tmp_path: Path, recorded: Path) ->
     assert float(first["mean speed [m/s]"]) == pytest.approx(8.0, rel=0.01)
     assert float(first["from [deg]"]) == pytest.approx(270.0, abs=2.0)
     assert float(first["standard uncertainty of mean speed [m/s]"]) > 0.0
-    assert "bias: speed against vector mean (v) [%]" in first
+    above = "mean speed above vector mean (v) [% of vector mean]"
+    assert float(first[above]) == pytest.approx(
+        100.0 * (float(first["mean speed [m/s]"]) / float(first["vector mean [m/s]"]) - 1.0),
+        abs=0.01,
+    )
+    assert "bias: arithmetic mean [% of mean speed]" in first
+    assert "raw mean speed [m/s]" in first
+
+
+def test_on_board_the_raw_speed_is_told_as_what_is_felt() -> None:
+    there, on_board = (
+        [q.name for q in wind_quantities(window(0, 5.0), with_vertical=False, on_board=moving)]
+        for moving in (False, True)
+    )
+    assert "raw mean speed" in there
+    assert "raw mean speed felt on board" in on_board and "raw mean speed" not in on_board
+
+
+def test_each_term_says_what_it_is_a_share_of() -> None:
+    turbulence = WindowTurbulence(5.0, 4.0, 0.1, False, SmallScales(0.01, 0.01), 0.0)
+    terms = array_terms(turbulence, 4.4)
+    assert terms["u"].value == pytest.approx(0.1) and terms["u"].relative_to == "vector mean"
+    told = bias_quantities(replace(window(0, 5.0), bias_terms=terms), ["u", "w", "v"])
+    assert [q.unit for q in told] == ["% of vector mean", "% of mean speed", "% of vector mean"]
+    assert told[2].value == pytest.approx(25.0)

@@ -52,6 +52,10 @@ TABLE_FILE = "windows.csv"
 _PLAIN_WIDTH = 120
 """Of the tables where no terminal says its own."""
 _UNCERTAINTY = "±: standard uncertainty, one sigma (68 %)."
+_SPEED_ABOVE_VECTOR = (
+    "v: what veering wind makes the mean speed exceed the vector mean by; no error of the mean "
+    "speed, which is told with it."
+)
 _ARITHMETIC_MEAN = (
     "arithmetic mean: by how much a mean over revolutions exceeds the mean over time; counted, so "
     "without uncertainty."
@@ -189,7 +193,8 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
         console.print(f"No estimate: {reason}.")
         return
     start = result.recording.start
-    with_vertical = measures_vertical(result.recording.station)
+    station = result.recording.station
+    with_vertical, on_board = measures_vertical(station), station.platform is not None
     components = "uvw" if with_vertical else "uv"
     table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")
     table.add_column("window\n[s]")
@@ -200,7 +205,8 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
     if with_vertical:
         table.add_column("upwards\n[m/s]", justify="right")
     for window in result.windows:
-        found = {q.name: q for q in wind_quantities(window, with_vertical=with_vertical)}
+        quantities = wind_quantities(window, with_vertical=with_vertical, on_board=on_board)
+        found = {q.name: q for q in quantities}
         table.add_row(
             _span(window, start),
             _told(found["mean speed"], ".3f"),
@@ -212,15 +218,18 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
         )
     console.print(table)
     terms = told_terms(result)
-    biases = Table(title="bias of the raw mean speed [% of the mean speed]", title_justify="left")
-    biases.add_column("window [s]")
-    for term in terms:
-        biases.add_column(TERMS[term], justify="right")
+    title = f"bias of the raw mean speed{', which is felt on board' if on_board else ''}"
+    biases = Table(title=title, title_justify="left")
+    biases.add_column("window\n[s]")
+    for quantity in bias_quantities(result.windows[0], terms):
+        biases.add_column(f"{quantity.name}\n[{quantity.unit}]", justify="right")
     for window in result.windows:
         told = (_told(bias, "+.2f") for bias in bias_quantities(window, terms))
         biases.add_row(_span(window, start), *told)
     console.print(biases)
     console.print(_UNCERTAINTY)
+    if "v" in terms:
+        console.print(_SPEED_ABOVE_VECTOR)
     if "arithmetic_mean" in terms:
         console.print(_ARITHMETIC_MEAN)
 

@@ -95,11 +95,11 @@ def _translation(rotor: Propeller, vane: Angle, mu2: float, eps: float, speed: f
 
 def _excess_of_scalar_mean(turbulence: WindowTurbulence) -> BiasTerm:
     excess = turbulence.speed / max(turbulence.vector_speed, 0.1) - 1.0
-    return BiasTerm(excess, 0.05 * abs(excess))
+    return BiasTerm(excess, 0.05 * abs(excess), "vector mean")
 
 
 def array_terms(turbulence: WindowTurbulence, indicated_speed: float) -> dict[str, BiasTerm]:
-    """Terms of an array relative to the mean speed, as `predicted_terms` names them.
+    """Terms of an array as `predicted_terms` names them; `u` and `v` relative to the vector mean.
 
     What lag, angular response and friction do to propellers at large angles has no closed form:
     `u` is all of it together, the indicated against the corrected vector mean.
@@ -111,7 +111,7 @@ def array_terms(turbulence: WindowTurbulence, indicated_speed: float) -> dict[st
     total = indicated_speed / max(turbulence.vector_speed, 0.1) - 1.0
     none = BiasTerm(0.0, 0.0)
     return {
-        "u": BiasTerm(total, _LEVEL_UNCERTAINTY * abs(total)),
+        "u": BiasTerm(total, _LEVEL_UNCERTAINTY * abs(total), "vector mean"),
         "v": _excess_of_scalar_mean(turbulence),
         "w": none,
         "vane_lag": none,
@@ -126,7 +126,7 @@ def predicted_terms(
     turbulence: WindowTurbulence,
     arithmetic_mean: float,
 ) -> dict[str, BiasTerm]:
-    """Terms relative to the mean speed.
+    """Terms relative to the mean speed, `v` to the vector mean.
 
     Args:
         rotor: The rotor.
@@ -137,7 +137,7 @@ def predicted_terms(
 
     Returns:
         u (overspeeding; K14 (75) where the method knows what the rotor did not follow, else the
-        inertial range, K14 (96)), v (speed against vector mean), w (angular response), vane_lag
+        inertial range, K14 (96)), v (mean speed over vector mean, less 1), w (angular response), vane_lag
         (what the vane does not follow), translation (the propeller moves with the vane),
         arithmetic_mean.
     """

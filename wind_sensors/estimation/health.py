@@ -308,14 +308,15 @@ def window_health(window: WindowStatistics, is_old: bool) -> HealthItem:
 
 
 def bias_health(window: WindowStatistics, is_old: bool) -> HealthItem:
-    """The biases of the latest window, one key each, relative to the mean speed.
+    """The biases of the latest window, one key each.
 
     Args:
         window: The latest.
         is_old: Whether the windows after it had no wind at all.
     """
     values = {
-        name: f"{100.0 * term.value:+.3f} +- {100.0 * term.uncertainty:.3f} %"
+        name: f"{100.0 * term.value:+.3f} +- {100.0 * term.uncertainty:.3f} % of the "
+        f"{term.relative_to}"
         for name, term in window.bias_terms.items()
     }
     level, text = HealthLevel.OK, f"Removed from the mean of {window.instrument}."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -38,10 +38,17 @@ class WindEstimate(NamedTuple):
 
 
 class BiasTerm(NamedTuple):
-    """A relative bias of the raw mean speed and its standard uncertainty, both / mean speed."""
+    """A relative bias of the raw mean speed.
+
+    Attributes:
+        value: The bias [1].
+        uncertainty: Its standard uncertainty [1].
+        relative_to: What both are a share of.
+    """
 
     value: float
     uncertainty: float
+    relative_to: Literal["mean speed", "vector mean"] = "mean speed"
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,8 @@ class WindowStatistics:
             not measured, it allows for a vertical variance 2.5 times as large as assumed.
         bias: The velocity that was removed from the wind-run mean; east, north, up, shape (3,).
         bias_covariance: Of `bias` [m^2/s^2], shape (3, 3).
-        raw_scalar_mean: Count mean of the rotor by its calibration, nan without pulses.
+        raw_scalar_mean: Count mean of the rotor by its calibration, nan without pulses. On a moving
+            platform that of the wind felt on board.
         scalar_mean, scalar_mean_uncertainty: Corrected mean speed.
         direction, direction_uncertainty: Of the corrected vector mean.
         direction_variance: 1 - R^2 of the vane's readings [rad^2], Kristensen (1994), (85).
@@ -73,7 +81,8 @@ class WindowStatistics:
             [rad^2]. Like R it is weighted by wind run, not by time.
         turbulence: Standard deviations along, across and up [m/s], shape (3,).
         bias_terms: `u`, `v`, `w`, `vane_lag`, `translation`, `arithmetic_mean`: relative biases
-            of the raw reading. The Kalman method takes `u` from the moments of its smoothed state;
+            of the raw reading. `v`, by how much the mean speed exceeds the vector mean, is one only
+            where the vector mean is wanted: `scalar_mean` keeps it. The Kalman method takes `u` from the moments of its smoothed state;
             its other terms, and those of other methods, are from inertial-range formulas that hold
             for distance constants much smaller than the turbulence's integral length.
         instrument: Name of the rotor the run was counted with.

@@ -322,7 +322,7 @@ def _unfollowed(s: _Sums) -> float:
 
 def _without_count(window: WindowStatistics) -> WindowStatistics:
     """A window in which the rotor whose run is counted, or its vane, did not measure."""
-    nothing = BiasTerm(_NO_NUMBER, _NO_NUMBER)
+    terms = window.bias_terms.items()
     return replace(
         window,
         wind_run_mean=np.full(2, _NO_NUMBER),
@@ -332,7 +332,7 @@ def _without_count(window: WindowStatistics) -> WindowStatistics:
         direction_variance=_NO_NUMBER,
         corrected_direction_variance=_NO_NUMBER,
         direction_variance_uncertainty=_NO_NUMBER,
-        bias_terms=dict.fromkeys(window.bias_terms, nothing),
+        bias_terms={name: BiasTerm(_NO_NUMBER, _NO_NUMBER, t.relative_to) for name, t in terms},
     )
 
 

@@ -15,13 +15,13 @@ from wind_sensors.motion.frames import direction_from_deg
 
 TERMS = {
     "u": "overspeeding (u)",
-    "v": "speed against vector mean (v)",
     "w": "angular response (w)",
     "vane_lag": "vane lag",
     "translation": "propeller translation",
     "arithmetic_mean": "arithmetic mean",
+    "v": "mean speed above vector mean (v)",
 }
-"""Names for people of the bias terms."""
+"""Names for people of the bias terms; the last is one of the vector mean alone."""
 
 
 class Quantity(NamedTuple):
@@ -40,12 +40,15 @@ class Quantity(NamedTuple):
     uncertainty: float | None = None
 
 
-def wind_quantities(window: WindowStatistics, *, with_vertical: bool) -> list[Quantity]:
+def wind_quantities(
+    window: WindowStatistics, *, with_vertical: bool, on_board: bool
+) -> list[Quantity]:
     """Means, direction and turbulence of a window.
 
     Args:
         window: The window.
         with_vertical: Whether the station measures the vertical wind.
+        on_board: Whether the rotor feels a moving platform's own speed as well.
     """
     east, north = float(window.vector_mean[0]), float(window.vector_mean[1])
     deviation = np.sqrt(np.maximum(np.diag(window.vector_mean_covariance), 0.0))
@@ -55,7 +58,10 @@ def wind_quantities(window: WindowStatistics, *, with_vertical: bool) -> list[Qu
     )
     quantities = [
         Quantity("mean speed", "m/s", window.scalar_mean, window.scalar_mean_uncertainty),
-        Quantity("raw mean speed", "m/s", window.raw_scalar_mean),
+        Quantity(
+            "raw mean speed felt on board" if on_board else "raw mean speed", "m/s",
+            window.raw_scalar_mean,
+        ),
         Quantity("vector mean", "m/s", math.hypot(east, north), float(deviation[0])),
         Quantity(
             "from", "deg", float(direction_from_deg(window.vector_mean)),
@@ -75,30 +81,37 @@ def told_terms(result: ProcessedRecording) -> list[str]:
     """The bias terms that the station's instruments can have: the others are 0 without doubt."""
 
     def can_be(term: str) -> bool:
-        known = (n for w in result.windows for n in w.bias_terms[term] if math.isfinite(n))
+        terms = (w.bias_terms[term] for w in result.windows)
+        known = (n for t in terms for n in (t.value, t.uncertainty) if math.isfinite(n))
         return any(known)
 
     return [term for term in TERMS if can_be(term)]
 
 
 def bias_quantities(window: WindowStatistics, terms: list[str]) -> list[Quantity]:
-    """Biases of a window's raw mean speed in percent of the mean speed."""
+    """Biases of a window's raw mean speed in percent; the unit tells of what."""
     return [
-        Quantity(TERMS[term], "%", 100.0 * bias.value, 100.0 * bias.uncertainty)
+        Quantity(
+            TERMS[term], f"% of {bias.relative_to}", 100.0 * bias.value, 100.0 * bias.uncertainty
+        )
         for term, bias in ((term, window.bias_terms[term]) for term in terms)
     ]
 
 
 def windows_csv(result: ProcessedRecording) -> str:
     """The windows as a table, units in its header, the standard uncertainty behind what has one."""
-    with_vertical = measures_vertical(result.recording.station)
+    station = result.recording.station
+    with_vertical, on_board = measures_vertical(station), station.platform is not None
     terms = told_terms(result)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     for number, window in enumerate(result.windows):
-        quantities = wind_quantities(window, with_vertical=with_vertical)
+        quantities = wind_quantities(window, with_vertical=with_vertical, on_board=on_board)
         biases = bias_quantities(window, terms)
-        quantities += [bias._replace(name=f"bias: {bias.name}") for bias in biases]
+        quantities += [
+            bias if bias.name == TERMS["v"] else bias._replace(name=f"bias: {bias.name}")
+            for bias in biases
+        ]
         if number == 0:
             table.writerow(["start [UTC]", "stop [UTC]", "data [%]", *_headings(quantities)])
         table.writerow(
