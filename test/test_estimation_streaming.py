@@ -157,6 +157,31 @@ def test_a_clock_that_jumps_back_starts_the_estimate_anew(recording: Recording) 
     assert np.array_equal(twice.velocity[once.time.size :], once.velocity)
 
 
+def test_a_pause_of_all_signals_is_told_as_one_and_keeps_the_windows(recording: Recording) -> None:
+    stream = messages(recording)
+    pause = 95_000_000_000
+    middle = recording.start + 27_000_000_000
+    moved = [(k, n, t + pause * (t > middle), v) for k, n, t, v in stream]
+    estimator = make_estimator(mast(), SETTINGS)
+    feed(estimator, moved)
+    estimator.flush()
+    clock = next(i for i in estimator.health(whole=True) if i.name == "clock")
+    assert clock.message.startswith("No input was heard for 95.")
+    assert "or the clock jumped ahead; the estimate began anew" in clock.message
+    windows = estimator.take_windows()
+    begin = windows[0].start
+    seconds = [round((w.start - begin) * 1e-9) for w in windows]
+    ends = [round((w.stop - begin) * 1e-9) for w in windows]
+    # 27 s and a pause of 95 s: after it the windows go on where they would have been.
+    assert seconds[:4] == [0, 20, 122, 140] and ends[2] == 140
+    assert [w.complete > 0.9 for w in windows[2:4]] == [True, True]
+    # What is counted after the pause is what is estimated then.
+    assert windows[2].raw_scalar_mean == pytest.approx(windows[2].scalar_mean, rel=0.1)
+    assert windows[3].raw_scalar_mean == pytest.approx(windows[3].scalar_mean, rel=0.1)
+    estimator, _ = run(stream + stream)
+    assert item(estimator, "clock").message.startswith("The clock jumped back once")
+
+
 def test_one_stray_stamp_does_not_move_the_clock(recording: Recording) -> None:
     stream = messages(recording)
     _, straight = run(stream)

@@ -38,7 +38,6 @@ from wind_sensors.recordings.reading import (
 )
 from wind_sensors.recordings.writing import clear_target, keep_inputs
 from wind_sensors.report.window_table import (
-    TERMS,
     Quantity,
     bias_quantities,
     told_terms,

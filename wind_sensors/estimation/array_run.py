@@ -29,8 +29,8 @@ class ArrayRunCounter:
 
     Args:
         station: The station; its fixed propellers are used.
-        start: Of the first window [ns].
-        length: Of a window [ns].
+        start: Of the first block [ns].
+        windows: Into which the turns are sorted.
         use_air: As in the settings.
 
     Attributes:
@@ -38,7 +38,7 @@ class ArrayRunCounter:
         vane: None.
     """
 
-    def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
+    def __init__(self, station: Station, start: int, windows: Windows, use_air: bool) -> None:
         self._propellers = fixed_propellers_of(station)
         self._columns = np.asarray(np.linalg.pinv(array_axes(self._propellers)), dtype=np.float64)
         # Wind at which all propellers would stand still, in sensor axes [m/s].
@@ -48,7 +48,7 @@ class ArrayRunCounter:
         self._tracks = [RotorTrack(p.name, station, start) for p in self._propellers]
         self._angle: list[float | None] = [None] * len(self._propellers)
         self._source = CircumstanceSource(station, use_air)
-        self._windows = Windows(start, length)
+        self._windows = windows
         self.rotor = self._propellers[0]
         self.vane = None
 

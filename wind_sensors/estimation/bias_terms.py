@@ -137,9 +137,9 @@ def predicted_terms(
 
     Returns:
         u (overspeeding; K14 (75) where the method knows what the rotor did not follow, else the
-        inertial range, K14 (96)), v (mean speed over vector mean, less 1), w (angular response), vane_lag
-        (what the vane does not follow), translation (the propeller moves with the vane),
-        arithmetic_mean.
+        inertial range, K14 (96)), v (mean speed over vector mean, less 1), w (angular
+        response), vane_lag (what the vane does not follow), translation (the propeller moves with
+        the vane), arithmetic_mean.
     """
     speed = max(turbulence.speed, 0.1)
     p = rotor_parameters(rotor)

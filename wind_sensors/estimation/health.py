@@ -203,7 +203,7 @@ def clock_health(intake: Intake, unknown: Mapping[str, Tally], whole: bool) -> H
     if off:
         return HealthItem("clock", HealthLevel.ERROR, " ".join(off), values)
     if jumps:
-        text = f"The clock has jumped {jumps} times{span.text}; the estimate began anew."
+        text = _jumps_text(jumps, span.count(intake.pauses), intake.longest_pause * 1e-9, span)
     elif any(ahead.values()):
         guilty = ", ".join(f"{count} of {name}" for name, count in ahead.items() if count)
         text = f"Implausible stamps, ahead of all others, were left out{span.text}: {guilty}."
@@ -212,6 +212,24 @@ def clock_health(intake: Intake, unknown: Mapping[str, Tally], whole: bool) -> H
     else:
         return HealthItem("clock", HealthLevel.OK, "Stamps run forward.", values)
     return HealthItem("clock", HealthLevel.WARN, text, values)
+
+
+def _jumps_text(jumps: int, pauses: int, longest: float, span: _Span) -> str:
+    """What to say of steps of the clock, those ahead among them, which a pause makes as well."""
+    said = []
+    if jumps > pauses:
+        said.append(f"the clock jumped back {_times(jumps - pauses)}{span.text}")
+    if pauses:
+        length = f" for {_offset_text(longest)}" if pauses == 1 else (
+            f" {_times(pauses)}, for {_offset_text(longest)} at the longest"
+        )
+        said.append(f"no input was heard{length}{span.text}, or the clock jumped ahead")
+    text = f"{'; '.join(said)}; the estimate began anew."
+    return text[0].upper() + text[1:]
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def motion_health(intake: Intake, refused: Tally, refusing: bool, whole: bool) -> HealthItem:

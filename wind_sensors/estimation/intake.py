@@ -126,6 +126,15 @@ class Intake:
             least and at most; between them as much as a slow source needs for its next state.
         gap_ns: Silence that counts as a gap.
         jump_ns: Step of the clock, back or ahead, that one message alone does not prove.
+
+    Attributes:
+        records: What came in, by input name.
+        jumps: Steps of the clock with which all began anew.
+        pauses: Those of them that were ahead: no input may have been heard for so long.
+        longest_pause: The longest of these [ns].
+        watermark: Latest time of measurement [ns].
+        origin: Start of the first block [ns]; None before it.
+        released: End of the latest block [ns].
     """
 
     def __init__(
@@ -146,6 +155,8 @@ class Intake:
         self._gap = gap_ns
         self._jump = jump_ns
         self.jumps = Tally()
+        self.pauses = Tally()
+        self.longest_pause = 0
         self.watermark = 0
         self.origin: int | None = None
         self.released = 0
@@ -241,13 +252,18 @@ class Intake:
     def restart(self) -> None:
         """After a jump: forget, and begin with the messages that proved it."""
         proof, self._astray = self._astray, []
+        pause = min(self._true(n, s) for n, s, _ in proof) - self.watermark
         self.forget()
         for record in self.records.values():
             record.set_clock_anew()
         self.jumps.forget()
+        self.pauses.forget()
         for name, stamp, value in proof:
             self.add(name, stamp, value)
         self.jumps.add(self.watermark)
+        if pause > 0:
+            self.pauses.add(self.watermark)
+            self.longest_pause = max(self.longest_pause, pause)
 
     def _keep(self, name: str, stamp: int, value: tuple[float, ...]) -> None:
         time = self._true(name, stamp)

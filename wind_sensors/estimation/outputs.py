@@ -82,9 +82,10 @@ class WindowStatistics:
         turbulence: Standard deviations along, across and up [m/s], shape (3,).
         bias_terms: `u`, `v`, `w`, `vane_lag`, `translation`, `arithmetic_mean`: relative biases
             of the raw reading. `v`, by how much the mean speed exceeds the vector mean, is one only
-            where the vector mean is wanted: `scalar_mean` keeps it. The Kalman method takes `u` from the moments of its smoothed state;
-            its other terms, and those of other methods, are from inertial-range formulas that hold
-            for distance constants much smaller than the turbulence's integral length.
+            where the vector mean is wanted: `scalar_mean` keeps it. The Kalman method takes `u`
+            from the moments of its smoothed state; its other terms, and those of other methods, are
+            from inertial-range formulas that hold for distance constants much smaller than the
+            turbulence's integral length.
         instrument: Name of the rotor the run was counted with.
     """
 

@@ -87,8 +87,8 @@ class RunCounter:
 
     Args:
         station: The station; the first rotor and the vane that belongs to it are used.
-        start: Of the first window [ns].
-        length: Of a window [ns].
+        start: Of the first block [ns].
+        windows: Into which the messages are sorted.
         use_air: As in the settings.
 
     Attributes:
@@ -96,7 +96,7 @@ class RunCounter:
         vane: The vane or bivane that tells the direction.
     """
 
-    def __init__(self, station: Station, start: int, length: int, use_air: bool) -> None:
+    def __init__(self, station: Station, start: int, windows: Windows, use_air: bool) -> None:
         self.history = History(station, start, 1.0)
         self.rotor = self.history.rotor
         self.vane = self.history.vane
@@ -110,7 +110,7 @@ class RunCounter:
         self._last_angle = 0.0
         self._turn_times: TimeArray = np.empty(0, dtype=np.int64)
         self._turn_angles: FloatArray = np.empty(0)
-        self._windows = Windows(start, length)
+        self._windows = windows
         self._pending: list[Block] = []
 
     def take(self, block: Block) -> None:

@@ -22,7 +22,7 @@ from wind_sensors.estimation.outputs import BiasTerm, WindowStatistics
 from wind_sensors.estimation.presence import Presence
 from wind_sensors.estimation.settings import EstimatorSettings
 from wind_sensors.estimation.site import has_wakes, site_covariance
-from wind_sensors.estimation.wind_run import RunCounter, RunSums
+from wind_sensors.estimation.wind_run import RunCounter, RunSums, Windows
 from wind_sensors.instruments.cup_vane import direction_variance_logarithmic
 from wind_sensors.station.model import Station
 
@@ -74,7 +74,7 @@ class WindowAccumulator:
         self._length = round(settings.window * 1e9)
         self._counter: RunCounter | ArrayRunCounter | None = None
         self._vertical_is_measured = measures_vertical(station)
-        self._start = 0
+        self._start = self._end = 0
         self._last = 0
         self._number = 0
         self._sums = _Sums()
@@ -98,22 +98,33 @@ class WindowAccumulator:
         """
         if self._counter is None:
             kind = ArrayRunCounter if is_array(self._station) else RunCounter
+            grid = self._grid(block.start)
             self._counter = kind(
-                self._station, block.start, self._length, self._settings.use_air
+                self._station, block.start, Windows(grid, self._length), self._settings.use_air
             )
-            self._start = block.start
+            self._start, self._end = block.start, grid + self._length
             self._number = 0
         self._counter.take(block)
         self._last = block.stop
         return self._add(estimates, small, presence, until)
 
+    def _grid(self, start: int) -> int:
+        """Where the window begins that holds a start [ns]: after a pause as if there was none."""
+        if self._end == 0 or start < self._last:
+            return start
+        return start - (start - self._end) % self._length
+
     def finish(
         self, estimates: Estimates, small: SmallScales | None, presence: Presence
     ) -> list[WindowStatistics]:
-        """The remaining estimates and the last, shorter window; the next block starts anew."""
+        """The remaining estimates and the last, shorter window; the next block starts anew.
+
+        Its windows are those that would have followed; the first begins with it and is shorter.
+        Where it is earlier, as after a clock that was set back, they count from its start.
+        """
         out = self._add(estimates, small, presence, 0)
         if self._sums.count:
-            out += self._close(min(self._last, self._start + self._length), presence)
+            out += self._close(min(self._last, self._end), presence)
         self._counter = None
         self._sums = _Sums()
         return out
@@ -125,15 +136,15 @@ class WindowAccumulator:
         first = 0
         time = estimates.time
         while first < time.size:
-            end = self._start + self._length
+            end = self._end
             stop = int(np.searchsorted(time, end))
             if stop > first:
                 self._accumulate(estimates, slice(first, stop), small)
             if stop < time.size:
                 out += self._close(end, presence)
             first = stop
-        while until >= self._start + self._length:
-            out += self._close(self._start + self._length, presence)
+        while until >= self._end:
+            out += self._close(self._end, presence)
         return out
 
     def _accumulate(self, estimates: Estimates, part: slice, small: SmallScales | None) -> None:
@@ -173,6 +184,8 @@ class WindowAccumulator:
         assert self._counter is not None
         s, run, start = self._sums, self._counter.window(self._number), self._start
         self._start = stop
+        if stop == self._end:
+            self._end += self._length
         self._number += 1
         self._sums = _Sums()
         if s.count == 0:
