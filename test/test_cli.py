@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import subprocess
@@ -522,6 +523,73 @@ def test_the_detail_of_a_figure_holds_samples_whatever_their_distance() -> None:
     spectra = plots.draw("spectra", slow, None)
     assert spectra is not None
     assert not spectra.axes[0].texts, "the inertial subrange lies beyond"
+
+
+def mast_of_means(rows: int = 5000) -> Recording:
+    """Six rotors whose topics tell ten-minute means, and a vane that crosses north."""
+    quick = steady_recording()
+    made = [
+        {
+            "name": f"cup_{n}0_north_of_the_mast", "kind": "cup", "pulses_per_revolution": 2,
+            "pulses": {"topic": f"/cup_{n}", "type": "std_msgs/msg/Float64", "meaning": "value"},
+            "calibration_distance": 0.2, "starting_speed": 0.35, "distance_constant": 3.0,
+        }
+        for n in range(1, 7)
+    ]
+    vane = {"name": "vane", "kind": "vane", "distance_constant": 1.0, "damping_ratio": 0.4,
+            "joint_states": {"topic": "/vane"}}
+    station = Station.model_validate({"instruments": [*made, vane]})
+    rng = np.random.default_rng(3)
+    steps = np.full(rows, 600_000_000_000, dtype=np.int64)
+    steps[3000] *= 3000
+    time = START + np.cumsum(steps)
+    speed = np.maximum(8.0 + 3.0 * rng.standard_normal(rows), 0.0)
+    speed[4000:] = 0.0
+    turns = np.cumsum(np.maximum(speed - 0.35, 0.0) * 600.0 / (2.0 * np.pi * 0.2))
+    heading = np.radians(90.0 + 8.0 * rng.standard_normal(rows))
+    return replace(
+        quick, station=station, stop=int(time[-1]), reference=None,
+        pulses={one["name"]: Pulses(time, turns) for one in made},
+        angles={"vane": Angles(time, heading)},
+    )
+
+
+def test_what_is_told_as_a_speed_is_drawn_as_one_and_gaps_stay_open() -> None:
+    recording = mast_of_means()
+    figure = plots.draw("speed", recording, None)
+    assert figure is not None
+    whole = figure.axes[0]
+    x, y = (np.asarray(v, dtype=float) for v in whole.get_lines()[0].get_data())
+    after = x > (recording.stop - START) * 1e-9 - 300 * 600.0
+    assert np.all(y[after] == 0.0), "a rotor that tells 0 m/s stands at 0"
+    across = np.flatnonzero(np.diff(x) > 500_000.0)
+    assert across.size > 0 and np.isnan(y[across]).all(), "nothing is drawn over the gap"
+    assert "2026-01-01 00:00 UTC [d]" in whole.get_xlabel()
+    assert whole.get_title(loc="left").endswith("means over an hour")
+
+
+def test_a_legend_of_long_names_stays_inside_and_covers_nothing() -> None:
+    recording = mast_of_means()
+    for name in ("speed", "direction"):
+        figure = plots.draw(name, recording, None)
+        assert figure is not None
+        figure.savefig(io.BytesIO())
+        (legend,) = figure.legends
+        box = legend.get_window_extent()
+        assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0
+        for panel in figure.axes:
+            assert not box.overlaps(panel.get_window_extent())
+            assert panel.get_window_extent().width > 0.8 * figure.bbox.width
+
+
+def test_a_direction_is_averaged_as_one() -> None:
+    figure = plots.draw("direction", mast_of_means(), None)
+    assert figure is not None
+    (drawn,) = figure.axes[0].get_lines()
+    degrees = np.asarray(drawn.get_ydata(), dtype=float)
+    away = np.abs((degrees + 180.0) % 360.0 - 180.0)
+    assert np.all(away < 25.0), "means of directions about north are about north"
 
 
 def test_figures_are_the_same_every_time(tmp_path: Path) -> None:

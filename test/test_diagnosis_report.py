@@ -40,7 +40,9 @@ def test_steps_that_move_no_mean_are_drawn_before_and_after() -> None:
     found = stepped()
     vane = of(found, "vane_angle")
     known = found.baseline.channels[vane.name]
-    made = statistics_figure(found.comparison, known, found.simulated, found.corrected, vane)
+    made = statistics_figure(
+        found.comparison, known, found.simulated, found.corrected, vane, calibrated=True
+    )
     assert made is not None
     (axes,) = made.axes
     drawn = {line.get_label(): np.asarray(line.get_xdata()) for line in axes.get_lines()}
@@ -55,7 +57,9 @@ def test_what_departs_nowhere_is_not_drawn() -> None:
     found = stepped()
     cup = of(found, "rotor_rate")
     known = found.baseline.channels[cup.name]
-    drawn = statistics_figure(found.comparison, known, found.simulated, found.corrected, cup)
+    drawn = statistics_figure(
+        found.comparison, known, found.simulated, found.corrected, cup, calibrated=True
+    )
     assert drawn is None
 
 
@@ -69,7 +73,9 @@ def test_what_departs_too_far_to_be_drawn_is_told_at_the_edge(far: float) -> Non
     mean[place] -= far * known.statistics_deviation[place]
 
     def told_of_steps(baseline: ChannelBaseline) -> float:
-        made = statistics_figure(found.comparison, baseline, found.simulated, None, vane)
+        made = statistics_figure(
+            found.comparison, baseline, found.simulated, None, vane, calibrated=True
+        )
         assert made is not None
         (axes,) = made.axes
         assert np.abs(axes.get_lines()[0].get_xdata()).max() <= 40.0
@@ -151,6 +157,25 @@ def test_grey_is_explained_where_there_is_grey() -> None:
     elsewhere = Region("cup/rotor_rate", "all", 0.0, 0.0, "")
     only = replace(found.findings[0], located=Found(elsewhere, 9.0, 0.5, "m/s"))
     assert "grey" not in page(replace(found, findings=(only,)))
+
+
+def test_without_healthy_days_nothing_is_measured_by_them() -> None:
+    found = stepped()
+    told = page(found)
+    assert "deviations of healthy days" in told and "1 is what healthy days show" in told
+    alone = replace(found, calibrated=False, baseline=replace(found.baseline, recordings=()))
+    assert not alone.baseline.calibrated
+    told = page(alone)
+    assert "deviations that certificates allow" in told
+    assert "grey is what certificates allow" in told
+    assert "1 is what certificates allow" in told
+    assert "No healthy recording is behind what counts as usual" in told
+    assert "healthy days show" not in told and "of healthy days" not in told
+    assert "what healthy days of stations with a baseline and simplified forms leave" in told
+
+
+def test_what_was_compared_and_is_not_drawn_is_told() -> None:
+    assert "Compared as well, and not drawn: cup, rotor rate." in page(stepped())
 
 
 def test_names_in_equations_are_set_apart() -> None:

@@ -151,6 +151,8 @@ def statistics_figure(
     corrected: Simulated | None,
     channel: Channel,
     width: float = WIDE,
+    *,
+    calibrated: bool,
 ) -> Figure | None:
     """How far spectra and statistics of the raw signals lie from the simulation's; before, after.
 
@@ -163,6 +165,7 @@ def statistics_figure(
         corrected: With the named physics; None: nothing is named.
         channel: What is shown.
         width: Of the figure [inch].
+        calibrated: Whether healthy days stand behind `known`, or certificates alone.
 
     Returns:
         None if nothing departs from healthy days.
@@ -210,7 +213,8 @@ def statistics_figure(
             f"Raw signals, {channel_words(channel.name)}",
             x=0.01, ha="left", fontsize=11, fontweight="bold", color=style.INK,
         )
-        scale = "recorded minus simulated,\nin standard deviations of healthy days"
+        usual = "of healthy days" if calibrated else "that certificates allow"
+        scale = f"recorded minus simulated,\nin standard deviations {usual}"
         axes.set_xlabel(scale if is_narrow(width) else scale.replace("\n", " "))
         if corrected is not None:
             made.legend(loc="outside lower left", ncols=2)

@@ -106,8 +106,8 @@ def _summary(diagnosis: Diagnosis) -> str:
         if nearest and not diagnosis.objection:
             lines.append(
                 f"<p class='muted'>What comes nearest, {escape(nearest)}, is not borne out: it "
-                "leaves more than a healthy day does, or needs a second effect that does not "
-                "show.</p>"
+                f"leaves more than {_usual(diagnosis.calibrated)}, or needs a second effect that "
+                "does not show.</p>"
             )
     if not diagnosis.calibrated:
         lines.append(
@@ -192,7 +192,7 @@ def _excess(found: Found) -> str:
     return f"{number_text(found.excess)} {escape(found.unit)}; "
 
 
-def _proof(finding: Finding) -> str:
+def _proof(finding: Finding, calibrated: bool) -> str:
     proof = finding.proof
     if proof is None:
         return ""
@@ -206,18 +206,19 @@ def _proof(finding: Finding) -> str:
         f"<p><b>{100.0 * proof.excess_removed:.0f} %</b> of the excess misfit disappears "
         f"(95 % interval {100.0 * proof.low:.0f} to {100.0 * proof.high:.0f} %). Whitened misfit "
         f"{proof.before:.3f} before, {proof.after:.3f} after; {proof.floor:.3f} on the fitted "
-        f"blocks; 1 is a healthy day.</p>{_checks(proof)}</section>"
+        f"blocks; 1 is what {_usual(calibrated)}.</p>{_checks(proof, calibrated)}</section>"
     )
 
 
-def _checks(proof: Proof) -> str:
+def _checks(proof: Proof, calibrated: bool) -> str:
     rows = [
         ("the next-best explanation removes", proof.placebo_removed),
         ("smooth curves over the wind speed with as many coefficients remove",
          proof.curve_removed),
         ("fitted to the calmer half of the blocks, it removes in the windier half",
          proof.transfer),
-        ("residuals within the band that holds 95 % on a healthy day", proof.coverage),
+        (f"residuals within the band that holds 95 % of what {_usual(calibrated)}",
+         proof.coverage),
     ]
     cells = [
         # Nought is added lest a little less than nothing be told as -0 %.
@@ -282,8 +283,9 @@ def _left(diagnosis: Diagnosis) -> str:
     return (
         "<section><h2>What is left</h2>"
         f"<p>p = {unexplained.p:.3g} for the largest remainder. A score is what the fit would gain "
-        "if the residual were moved there; up to the last column it is what healthy days and "
-        "simplified forms leave.</p><div class='scroll'><table>"
+        "if the residual were moved there; up to the last column it is what healthy days"
+        f"{'' if diagnosis.calibrated else ' of stations with a baseline'} and simplified forms "
+        "leave.</p><div class='scroll'><table>"
         "<tr><th>channel</th><th>where</th><th class='n'>residual</th><th class='n'>score</th>"
         "<th class='n'>usual to</th></tr>"
         f"{rows}</table></div></section>"
@@ -316,7 +318,12 @@ def _taken_out(without: Sequence[str]) -> str:
 
 def _healthy(baseline: Baseline) -> str:
     """The healthy recordings, and where their instruments differ from the station's file."""
-    names = ", ".join(baseline.recordings) or "none"
+    if not baseline.calibrated:
+        return (
+            "<p class='muted'>No healthy recording is behind what counts as usual: certificate "
+            "tolerances are.</p>"
+        )
+    names = ", ".join(baseline.recordings)
     out = f"<p class='muted'>Healthy recordings behind the baseline: {escape(names)}.</p>"
     before = {entry.name: entry for entry in baseline.original.instruments}
     shown = []
@@ -333,12 +340,24 @@ def _healthy(baseline: Baseline) -> str:
         elif isinstance(entry, Angle) and isinstance(described, Angle):
             turned = entry.offset_deg - described.offset_deg
             shown.append(f"{escape(entry.name)}: offset {turned:+.1f} deg")
-    if baseline.calibrated and shown:
+    if shown:
         out += (
             "<p class='muted'>What they show beyond the station's file, from which the sizes of "
             f"findings count: {'; '.join(shown)}.</p>"
         )
     return out
+
+
+def _usual(calibrated: bool) -> str:
+    """What is not worth a word, and says who."""
+    return "healthy days show" if calibrated else "certificates allow"
+
+
+def _not_drawn(channels: Sequence[str]) -> str:
+    if not channels:
+        return ""
+    names = "; ".join(channel_words(name) for name in channels)
+    return f"<p class='muted'>Compared as well, and not drawn: {escape(names)}.</p>"
 
 
 def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
@@ -353,6 +372,8 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
     }
     corrected = diagnosis.corrected if diagnosis.findings else None
     comparison, simulated = diagnosis.comparison, diagnosis.simulated
+    calibrated = diagnosis.calibrated
+    statistics = partial(statistics_figure, calibrated=calibrated)
     figures: list[str] = []
     grey = False
     for channel in comparison.channels:
@@ -366,7 +387,7 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
             for what, draw, of in (
                 ("recorded minus simulated", residual_figure, shown),
                 ("power of eddies", activity_figure, beside_healthy),
-                ("raw signals", statistics_figure, beside_healthy),
+                ("raw signals", statistics, beside_healthy),
             )
         ]
         figures += drawn
@@ -378,11 +399,12 @@ def page(diagnosis: Diagnosis, without: Sequence[str] = ()) -> str:
         f"<section><h2>{'Before and after' if corrected else 'Recorded minus simulated'}</h2>"
         "<p class='muted'>Orange: recorded minus the simulation of the station as it was "
         f"described. {'Blue: with the named physics. ' if corrected else ''}Bars are two standard "
-        f"errors{'; grey is what healthy days show' if grey else ''}.</p>"
+        f"errors{f'; grey is what {_usual(calibrated)}' if grey else ''}.</p>"
+        + _not_drawn([c.name for c in comparison.channels if c.name not in wanted])
         + "".join(figures)
         + "</section>",
         *(_physics(f, diagnosis.station) for f in diagnosis.findings),
-        *(_proof(f) for f in diagnosis.findings[:1]),
+        *(_proof(f, calibrated) for f in diagnosis.findings[:1]),
         _next(diagnosis),
         _left(diagnosis),
         _detectable(diagnosis),

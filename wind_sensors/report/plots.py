@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -23,6 +24,10 @@ _ZOOM_SAMPLES = 20.0
 _ROUND_SPANS = (60.0, 600.0, 3600.0, 21_600.0, 86_400.0, 604_800.0)
 """Lengths that the detail may have [s]."""
 _SPAN_WORDS = ("a minute", "ten minutes", "an hour", "six hours", "a day", "a week")
+_MOST_POINTS = 3000.0
+"""Of a line over the whole recording: means over one of the round spans are drawn of more."""
+_GAP = 3.0
+"""No line is drawn over an interval so many times as long as all but one in a hundred."""
 _UNITS = ((2.0 * 86_400.0, 86_400.0, "d"), (3.0 * 3600.0, 3600.0, "h"), (0.0, 1.0, "s"))
 """Axes longer than the first [s] are in units of the second [s], called so."""
 _SLOPE_SPAN = (0.05, 2.0)
@@ -30,6 +35,8 @@ _SLOPE_SPAN = (0.05, 2.0)
 _RATE = 10.0
 """Of the grid for spectra [Hz]."""
 _NINETY_PERCENT = 1.6449
+_HANDLE, _CHARACTER = 0.6, 0.085
+"""Widths of a legend's handle with what is around it, and of a character of its names [inch]."""
 
 
 class Estimates(NamedTuple):
@@ -51,7 +58,7 @@ def rotor_speed(rotor: Cup | Propeller, pulses: Pulses) -> tuple[TimeArray, Floa
 
     Returns:
         Middle of each revolution [ns] and the speed [m/s]; where the source counts, of each
-        interval between counts.
+        interval between counts. Where it tells speeds, a rotor at rest tells 0.
     """
     time = np.sort(pulses.time)
     if pulses.turns is None:
@@ -65,7 +72,10 @@ def rotor_speed(rotor: Cup | Propeller, pulses: Pulses) -> tuple[TimeArray, Floa
     rate = 2.0 * np.pi * turns[good] / seconds[good]
     offset = rotor.starting_speed if isinstance(rotor, Cup) else 0.0
     middle = time[:-1][good] + np.diff(time)[good] // 2
-    return middle, rotor.calibration_distance * rate + offset
+    speed = rotor.calibration_distance * rate + offset
+    if rotor.pulses.meaning == "value":
+        speed = np.where(rate == 0.0, 0.0, speed)
+    return middle, speed
 
 
 def speed_figure(recording: Recording, estimates: Estimates | None) -> Figure | None:
@@ -76,7 +86,7 @@ def speed_figure(recording: Recording, estimates: Estimates | None) -> Figure | 
         if isinstance(rotor, (Cup, Propeller)) and len(pulses.time) > 2:
             time, speed = rotor_speed(rotor, pulses)
             colour = style.SERIES[(index + 1) % len(style.SERIES)]
-            lines.append((f"{name}, calibration only", time, speed, colour))
+            lines.append((name, time, speed, colour))
     if recording.reference is not None:
         winds = recording.reference
         speed = np.hypot(winds.velocity[:, 0], winds.velocity[:, 1])
@@ -86,20 +96,30 @@ def speed_figure(recording: Recording, estimates: Estimates | None) -> Figure | 
     made, axes = style.figure(2)
     apparent = recording.station.platform is not None
     for panel, span in zip(axes, _spans(recording, [time for _, time, _, _ in lines]), strict=True):
-        step = 1.0 if span[1] - span[0] > 5.0 * _ZOOM else 0.0
+        step = _step(span)
         for label, time, value, colour in lines:
             seconds = _since(recording, time)
             x, y = _thinned(seconds, value, span, step)
+            if _is_sampled(recording, label):
+                x, y = _with_gaps(x, y, seconds, step)
             faint = label == "reference"
             panel.plot(x, y, color=colour, lw=1.0 if faint else 1.2, label=label)
         if estimates is not None:
             _speed_band(panel, recording, estimates, span, step)
         panel.set_ylabel("speed [m/s]")
         panel.set_ylim(bottom=0.0)
-        _time_axis(panel, span)
-    title = "Wind speed" + (" (the rotor's is relative to the moving platform)" if apparent else "")
-    _finish(axes, title)
+        _time_axis(recording, panel, span)
+    of_rotors = " (rotors by their calibration alone)"
+    if apparent:
+        of_rotors = " (rotors by their calibration alone, relative to the moving platform)"
+    _finish(made, axes, "Wind speed" + (of_rotors if recording.pulses else ""))
     return made
+
+
+def _is_sampled(recording: Recording, label: str) -> bool:
+    """Whether silence is a gap in a line's source; between edges it is a slow rotor."""
+    pulses = recording.pulses.get(label)
+    return pulses is None or pulses.turns is not None
 
 
 def direction_figure(recording: Recording, estimates: Estimates | None) -> Figure | None:
@@ -115,7 +135,7 @@ def direction_figure(recording: Recording, estimates: Estimates | None) -> Figur
         heading = angles.angle + _sensor_heading(recording, angles.time)
         degrees = compass_from_yaw(heading)
         colour = style.SERIES[(index + 1) % len(style.SERIES)]
-        lines.append((f"{name}, as read", angles.time, degrees, colour))
+        lines.append((name, angles.time, degrees, colour))
     if estimates is not None:
         degrees = direction_from_deg(estimates.velocity)
         lines.append(("corrected", estimates.time, degrees, style.CORRECTED))
@@ -124,15 +144,24 @@ def direction_figure(recording: Recording, estimates: Estimates | None) -> Figur
     middle = _circular_mean(lines[0][2])
     made, axes = style.figure(2)
     for panel, span in zip(axes, _spans(recording, [time for _, time, _, _ in lines]), strict=True):
+        step = _step(span)
         for label, time, value, colour in lines:
-            around = middle + np.mod(value - middle + 180.0, 360.0) - 180.0
             seconds = _since(recording, time)
-            x, y = _thinned(seconds, around, span, 1.0 if span[1] - span[0] > 5 * _ZOOM else 0.0)
-            panel.plot(x, y, color=colour, lw=1.0, label=label)
+            x, north = _thinned(seconds, np.cos(np.radians(value)), span, step)
+            _, east = _thinned(seconds, np.sin(np.radians(value)), span, step)
+            degrees = np.degrees(np.arctan2(east, north))
+            around = middle + np.mod(degrees - middle + 180.0, 360.0) - 180.0
+            if step > 1.0 and panel is axes[0]:
+                panel.plot(x, around, ".", color=colour, ms=2.0, label=label)
+                continue
+            x, around = _with_gaps(x, around, seconds, step)
+            # A direction that passes the end of the axis comes in at the other one.
+            around[1:][np.abs(np.diff(around)) > 180.0] = np.nan
+            panel.plot(x, around, color=colour, lw=1.0, label=label)
         panel.yaxis.set_major_formatter(lambda degrees, _: f"{degrees % 360.0:.0f}\N{DEGREE SIGN}")
         panel.set_ylabel("from, clockwise from north")
-        _time_axis(panel, span)
-    _finish(axes, "Direction the wind comes from")
+        _time_axis(recording, panel, span)
+    _finish(made, axes, "Direction the wind comes from (vanes as read)")
     return made
 
 
@@ -167,11 +196,11 @@ def spectra_figure(recording: Recording, estimates: Estimates | None) -> Figure 
         return None
     line = np.clip(np.asarray(_SLOPE_SPAN), ends[0], ends[1])
     if line[1] > 4.0 * line[0]:
-        level = top * (line / line[0]) ** (-2.0 / 3.0)
+        level = 1.6 * top * (line / line[0]) ** (-2.0 / 3.0)
         panel.loglog(line, level, color=style.MUTED, ls="--", lw=1.0)
         panel.annotate("slope -2/3", np.exp(np.log((line, level)).mean(axis=1)), (4, 5),
                        color=style.MUTED, textcoords="offset points")
-    panel.set_ylim(top * 1e-4, top * 2.0)
+    panel.set_ylim(top * 1e-4, top * 3.0)
     panel.set_xlabel("frequency [Hz]")
     panel.set_ylabel("frequency x spectral density [m\u00b2/s\u00b2]")
     panel.set_title("Spectra of the speed")
@@ -271,14 +300,44 @@ def _spans(recording: Recording, times: list[TimeArray]) -> list[tuple[float, fl
     return [(0.0, length), (start, min(start + zoom, length))]
 
 
-def _time_axis(panel: Axes, span: tuple[float, float]) -> None:
+def _step(span: tuple[float, float]) -> float:
+    """Over how long means are drawn [s]; 0: samples are."""
+    length = span[1] - span[0]
+    if length <= 5.0 * _ZOOM:
+        return 0.0
+    return next(
+        (s for s in (1.0, 10.0, *_ROUND_SPANS) if length <= _MOST_POINTS * s), _ROUND_SPANS[-1]
+    )
+
+
+def _with_gaps(
+    x: FloatArray, y: FloatArray, seconds: FloatArray, step: float
+) -> tuple[FloatArray, FloatArray]:
+    """A line that is open where its source was silent.
+
+    Args:
+        x, y: What is drawn.
+        seconds: Times of all the samples of the source [s].
+        step: Over how long means are drawn [s].
+    """
+    if len(seconds) < 3:
+        return x, y
+    usual = float(np.quantile(np.diff(np.sort(seconds)), 0.99))
+    open_at = np.flatnonzero(np.diff(x) > _GAP * max(usual, step)) + 1
+    return np.insert(x, open_at, x[open_at - 1]), np.insert(y, open_at, np.nan)
+
+
+def _time_axis(recording: Recording, panel: Axes, span: tuple[float, float]) -> None:
     """Limits and label of an axis whose data are in seconds, in a unit that fits its length."""
     unit, name = next((u, n) for least, u, n in _UNITS if span[1] - span[0] >= least)
     panel.set_xlim(span)
+    since = "the start"
     if unit != 1.0:
+        start = np.datetime_as_string(np.datetime64(recording.start, "ns"), unit="m")
+        since = f"{start.replace('T', ' ')} UTC"
         panel.xaxis.set_major_locator(_InUnits(unit))
         panel.xaxis.set_major_formatter(lambda seconds, _: f"{seconds / unit:g}")
-    panel.set_xlabel(f"time since the start [{name}]")
+    panel.set_xlabel(f"time since {since} [{name}]")
 
 
 class _InUnits(MaxNLocator):
@@ -321,20 +380,34 @@ def _speed_band(
     deviation = np.sqrt(np.sum(unit**2 * estimates.variance[:, :2], axis=1))
     seconds = _since(recording, estimates.time)
     x, middle = _thinned(seconds, speed, span, step)
-    panel.plot(x, middle, color=style.CORRECTED, label="corrected")
+    panel.plot(
+        *_with_gaps(x, middle, seconds, step), color=style.CORRECTED, label="corrected"
+    )
     if step <= 0.0:
         _, half = _thinned(seconds, _NINETY_PERCENT * deviation, span, step)
-        panel.fill_between(x, middle - half, middle + half, color=style.CORRECTED, alpha=0.2,
-                           lw=0, label="90 % interval")
+        at, low = _with_gaps(x, middle - half, seconds, step)
+        _, high = _with_gaps(x, middle + half, seconds, step)
+        panel.fill_between(at, low, high, color=style.CORRECTED, alpha=0.2, lw=0,
+                           label="90 % interval")
 
 
-def _finish(axes: list[Axes], title: str) -> None:
-    axes[0].set_title(title)
+def _finish(made: Figure, axes: list[Axes], title: str) -> None:
+    low, high = axes[0].get_xlim()
+    means = [
+        w for s, w in zip(_ROUND_SPANS, _SPAN_WORDS, strict=True) if s == _step((low, high))
+    ]
+    axes[0].set_title(title + (f", means over {means[0]}" if means else ""))
     low, high = axes[1].get_xlim()
     shown = [w for s, w in zip(_ROUND_SPANS, _SPAN_WORDS, strict=True) if np.isclose(s, high - low)]
     part = f"{shown[0]} of it" if shown else ""
     axes[1].set_title(part, fontsize=9.5, fontweight="normal")
-    axes[1].legend(loc="upper right", ncols=4, bbox_to_anchor=(1.0, 1.16), columnspacing=1.2)
+    handles, labels = axes[1].get_legend_handles_labels()
+    column = _HANDLE + _CHARACTER * max(len(label) for label in labels)
+    rows = math.ceil(len(labels) / max(1, int(made.get_figwidth() / column)))
+    columns = math.ceil(len(labels) / rows)
+    legend = made.legend(handles, labels, loc="outside lower center", ncols=columns)
+    for line in legend.get_lines():
+        line.set_markersize(8.0)
 
 
 def _spectrum(time: TimeArray, value: FloatArray, interval: float) -> tuple[FloatArray, FloatArray]:
