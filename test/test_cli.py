@@ -17,6 +17,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from wind_sensors.cli import main as front
 from wind_sensors.cli import monte_carlo
+from wind_sensors.cli.info import duration
 from wind_sensors.cli.main import main
 from wind_sensors.errors import UserError
 from wind_sensors.recordings import read_recording, write_recording
@@ -455,7 +456,8 @@ def test_info_shows_topics_rates_station_and_notes(
     assert "2026-01-01T00:00:00.000Z" in told
     assert f"{len(recording.pulses['cup'].time)}" in told
     assert "20 Hz" in told and "0.05 s" in told
-    assert "0.2 m/rad" in told and "nothing unusual" in told
+    assert duration(1.7e6) == "19 d 16 h" and duration(600.0) == "10 min"
+    assert "0.2 m/rad" in told and "reading had nothing to note" in told
     (folder / "bag" / "metadata.yaml").unlink()
     assert main(["info", str(folder)]) == 0
     assert "metadata.yaml" in capsys.readouterr().out
@@ -489,6 +491,16 @@ def test_info_finds_the_signals_of_topics_that_are_named_without_a_slash(
         assert main(["info", str(folder)]) == 0
         told.append(capsys.readouterr().out)
     assert told[0] == told[1]
+
+
+def test_info_tells_long_intervals_as_people_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_recording(tmp_path / "mast", mast_of_means())
+    assert main(["info", str(folder)]) == 0
+    told = capsys.readouterr().out
+    assert "every 10 min" in told and "20 d 20 h" in told
+    assert "e+06" not in told and "unusual" not in told
 
 
 @pytest.mark.parametrize("kind", ["png", "svg"])

@@ -176,7 +176,15 @@ def test_a_counter_that_restarts_counts_on(tmp_path: Path) -> None:
     turns = after.pulses["cup"].turns
     assert turns is not None
     assert turns.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-    assert any("restarted 1 times" in note for note in after.notes)
+    assert any("restarted once; if it wraps, state" in note for note in after.notes)
+
+
+def test_a_counter_that_wraps_is_recognised(tmp_path: Path) -> None:
+    source = Input(topic="/c", type="std_msgs/msg/Int32")
+    (note,) = counter(tmp_path, [65520, 65528, 3, 11, 19], source).notes
+    assert "restarted once" in note and note.endswith("write `modulus: 65536`")
+    (note,) = counter(tmp_path / "reset", [40000, 40008, 3, 11, 40, 5], source).notes
+    assert "restarted 2 times; if it wraps" in note
 
 
 def test_counters_that_are_right_are_left_alone(tmp_path: Path) -> None:

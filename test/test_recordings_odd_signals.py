@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from wind_sensors.recordings import read_recording, write_recording
 from wind_sensors.recordings.bag import typestore
-from wind_sensors.recordings.plausible import strays
+from wind_sensors.recordings.plausible import dropouts, strays
 from wind_sensors.recordings.reading import order_notes
 from wind_sensors.recordings.serialising import serialised, template
 from wind_sensors.station.model import (
@@ -106,6 +106,15 @@ def test_what_is_odd_in_the_signals_is_noted_and_not_fatal(tmp_path: Path) -> No
     assert "/v: 2 of 7 values are not numbers and were left out (the first at 2.000 s)" in notes
     assert "/c: 1 stamps repeated (the first at 2.000 s)" in notes
     assert "/c: 1 stamps earlier than the one before (the first at 1.000 s)" in notes
+
+
+def test_zeros_for_a_moment_in_a_fair_wind_are_noted(tmp_path: Path) -> None:
+    source = Input(topic="/c", type="std_msgs/msg/Float64", meaning="value")
+    told = [5.0, 5.2, 0.0, 0.0, 5.1, 5.0, 2.0, 0.0, 2.0, 0.0]
+    (note,) = counter(tmp_path, told, source).notes
+    assert "2 of 10 readings are 0 for a moment" in note and "3 m/s" in note
+    time = np.arange(3, dtype=np.int64) * 20_000_000_000
+    assert not dropouts(time, np.array([5.0, 0.0, 5.0])).any(), "a rotor may stop in a minute"
 
 
 def spread(stray: dict[int, int]) -> np.ndarray:

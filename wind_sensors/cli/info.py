@@ -28,6 +28,8 @@ from wind_sensors.station.signals import Recording, TimeArray
 
 _PLAIN_WIDTH = 120
 """Of the tables where no terminal says its own."""
+_SLOW = 10.0
+"""Messages further apart than this [s] are told by their interval instead of their rate."""
 _IN_WORDS = {
     "name", "kind", "profile", "distance_constant", "damping_ratio", "calibration_distance",
     "pulses_per_revolution", "mounted_on",
@@ -89,20 +91,23 @@ def run(options: argparse.Namespace) -> int:
     for note in recording.notes:
         console.print(Text.assemble(("note", "yellow"), f" {note}"))
     if not recording.notes:
-        console.print("nothing unusual in the signals")
+        console.print(
+            "reading had nothing to note; whether the signals make sense, `wind plot` and "
+            "`wind diagnose` show"
+        )
     return 0
 
 
 def duration(seconds: float) -> str:
-    """A span for people: `15 min 0 s`."""
+    """A span for people, in two units at most: `15 min`, `3 h 53 min`."""
     if seconds < 120.0:
         return f"{seconds:.3g} s"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     days, hours = divmod(hours, 24)
-    if days:
-        return f"{days} d {hours} h"
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+    parts = [(days, "d"), (hours, "h"), (minutes, "min"), (rest, "s")]
+    first = next(k for k, (count, _) in enumerate(parts) if count)
+    return " ".join(f"{count} {unit}" for count, unit in parts[first : first + 2] if count)
 
 
 def _print_topics(console: Console, content: BagContent, recording: Recording) -> None:
@@ -139,8 +144,12 @@ def _rate_and_gap(time: TimeArray) -> tuple[str, str]:
         return "", ""
     ordered = np.sort(time)
     span = (int(ordered[-1]) - int(ordered[0])) * 1e-9
-    gap = float(np.diff(ordered).max()) * 1e-9
-    return f"{(len(time) - 1) / span:.4g} Hz" if span > 0.0 else "", f"{gap:.3g} s"
+    between = np.diff(ordered) * 1e-9
+    usual = float(np.median(between))
+    rate = f"{(len(time) - 1) / span:.4g} Hz" if span > 0.0 else ""
+    if usual > _SLOW:
+        rate = f"every {duration(usual)}"
+    return rate, duration(float(between.max()))
 
 
 def _print_station(console: Console, station: Station) -> None:

@@ -16,7 +16,15 @@ from wind_sensors.recordings.bag import BagContent, TopicData, read_bag
 from wind_sensors.recordings.fields import batches, columns, leaf, stamps, texts
 from wind_sensors.recordings.file_order import SET_BACK
 from wind_sensors.recordings.platform import platform_states
-from wind_sensors.recordings.plausible import impossible, impossible_note, stray_note, strays
+from wind_sensors.recordings.plausible import (
+    dropout_note,
+    dropouts,
+    impossible,
+    impossible_note,
+    restart_note,
+    stray_note,
+    strays,
+)
 from wind_sensors.recordings.raw_topics import TRUTH_TOPIC
 from wind_sensors.recordings.station_files import load_station
 from wind_sensors.station.inputs import (
@@ -280,10 +288,7 @@ class _SignalReader:
         time, raw = self._numbers(source, data, path)
         counted = turns_from_raw(source, rotor, time.tolist(), raw.tolist())
         if counted.restarts:
-            wraps = "" if counted.restarts == 1 else "; if it wraps, state `modulus`"
-            self.notes.append(
-                f"{source.topic}: the counter restarted {counted.restarts} times{wraps}"
-            )
+            self.notes.append(restart_note(source.topic, raw, counted.restarts))
         if counted.jumps:
             first = counted.jumps[0]
             at = (int(time[first]) - int(time[0])) * 1e-9
@@ -292,6 +297,10 @@ class _SignalReader:
                 f"were left out (the first at {at:.3f} s, from {raw[first - 1]:g} to "
                 f"{raw[first]:g}); check `modulus`, or the source has restarted"
             )
+        if source.meaning == "value":
+            dropped = dropouts(time, scaled(source, raw))
+            if dropped.any():
+                self.notes.append(dropout_note(source.topic, dropped))
         return Pulses(time, counted.turns)
 
     def angles(self, signal: str, source: Input, kind: str) -> Angles | None:
