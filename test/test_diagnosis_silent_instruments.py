@@ -120,7 +120,7 @@ def test_no_baseline_is_learnt_from_what_says_nothing(dead: Callable[[], Recordi
 
 def test_other_diagnoses_tell_of_what_says_nothing() -> None:
     nothing = Unexplained(1.0, 0.0, (), "")
-    well = Outcome("r", "none", True, (), nothing, {}, STATION, 400.0, "latent")
+    well = Outcome("r", "none", True, (), nothing, {}, STATION, 0, 400.0, "latent")
     assert with_silent(well, ()) is well
     told = with_silent(well, silent_instruments(without_vane(), STATION))
     assert told.verdict == "unknown"

@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from wind_sensors.diagnosis.effects import catalogue
 from wind_sensors.diagnosis.effects.wording import number_text, parameter_text
 from wind_sensors.diagnosis.explaining.terms import Term
+from wind_sensors.diagnosis.json_output import finding_json
 from wind_sensors.diagnosis.means.findings import too_small
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.diagnosis.proving.proof import Proof
 from wind_sensors.diagnosis.regions import Found, Region
 from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.report.corrected_station import corrected_station
+from wind_sensors.report.diagnosis_page import when_text
 from wind_sensors.report.names import names_of
 from wind_sensors.report.removed import removed_text
 from wind_sensors.report.sizes import sizes_of
@@ -92,13 +94,36 @@ def test_the_corrected_station_tells_what_was_found_and_rounds() -> None:
     ), "a late moment keeps its tenth of a second"
 
 
-def test_long_times_are_days_and_short_ones_seconds() -> None:
+def test_late_moments_are_dates_and_early_ones_seconds() -> None:
     day = 86400.0
     long = finding("stuck_sensor", start=Estimate(10.5 * day, 10.5 * day, 10.51 * day, "s"))
     short = finding("stuck_sensor", start=Estimate(405.0, 404.0, 405.0, "s"))
-    assert sizes_of(long, STATION)[0].value == "10.50"
-    assert sizes_of(long, STATION)[0].unit.startswith("days")
-    assert sizes_of(short, STATION)[0].text == "start 405 s (404 to 405)"
+    start = 1_452_353_400_000_000_000
+    assert sizes_of(long, STATION, start)[0].text == (
+        "start 2016-01-20 03:30 UTC (2016-01-20 03:30 UTC to 2016-01-20 03:44 UTC)"
+    )
+    assert sizes_of(short, STATION, start)[0].text == "start 405 s (404 to 405)"
+    assert when_text(replace(long.term, interval=(0.0, 10.5 * day)), start) == (
+        "from 2016-01-09 15:30 UTC to 2016-01-20 03:30 UTC"
+    )
+    told = finding_json(replace(long, share=float("nan")), 20.0 * day)
+    # 10.51 days are 908064 s; to five digits they would be a minute late.
+    assert told["parameters"]["start"]["high"] == 908_064.0
+    assert told["relative_size"] is None, "nothing was fitted"
+    turned = finding("vane_offset", offset=Estimate(3.0, 2.0, 4.0, "deg"))
+    assert finding_json(turned, 9.0)["relative_size"] == 3.0
+
+
+def test_alternatives_are_other_effects_each_once() -> None:
+    found = replace(
+        finding("vane_offset", offset=Estimate(3.0, 2.0, 4.0, "deg")),
+        alternatives=(
+            ("vane_offset", "cup", 2.0), ("vane_eccentricity", "cup", 5.0),
+            ("vane_eccentricity", "cup", 3.0), ("vane_offset", "other", 4.0),
+        ),
+    )
+    told = [tuple(a.values()) for a in finding_json(found, 9.0)["alternatives"]]
+    assert told == [("vane_eccentricity", "cup", 3.0), ("vane_offset", "other", 4.0)]
 
 
 def test_what_has_no_interval_shows_none() -> None:

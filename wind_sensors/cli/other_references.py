@@ -118,7 +118,7 @@ def print_outcome(console: Console, outcome: Outcome) -> None:
             )
         )
         if f.term.effect.name != "stuck_sensor":
-            for size in sizes_of(f, outcome.station):
+            for size in sizes_of(f, outcome.station, outcome.start):
                 console.print(f"    {size.text}")
         if f.proof is not None:
             console.print(f"    on held-out blocks it removes {removed_text(f.proof)}")

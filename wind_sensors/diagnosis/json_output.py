@@ -48,8 +48,21 @@ def silent_json(silent: Sequence[Silent]) -> list[dict[str, str]]:
     return [{"instrument": s.instrument, "topic": s.topic, "words": s.words} for s in silent]
 
 
-def _rounded(value: float) -> float | None:
-    return float(f"{value:.5g}") if np.isfinite(value) else None
+def _rounded(value: float, unit: str = "") -> float | None:
+    """To five digits, moments of long recordings to the second."""
+    if not np.isfinite(value):
+        return None
+    return float(round(value)) if unit == "s" and abs(value) >= 1e5 else float(f"{value:.5g}")
+
+
+def _alternatives(finding: Finding) -> list[tuple[str, str, float]]:
+    """The nearest of each other effect and instrument: starts of one effect are no alternatives."""
+    nearest: dict[tuple[str, str], float] = {}
+    for name, instrument, behind in finding.alternatives:
+        key = (name, instrument)
+        nearest[key] = min(behind, nearest.get(key, behind))
+    nearest.pop((finding.term.effect.name, finding.term.instrument), None)
+    return [(*key, behind) for key, behind in nearest.items()][:6]
 
 
 def finding_json(finding: Finding, length: float) -> dict[str, Any]:
@@ -57,6 +70,7 @@ def finding_json(finding: Finding, length: float) -> dict[str, Any]:
     term = finding.term
     begin, end = term.interval
     region = finding.located.region
+    alternatives = _alternatives(finding)
     out: dict[str, Any] = {
         "effect": term.effect.name,
         "instrument": term.instrument,
@@ -75,20 +89,20 @@ def finding_json(finding: Finding, length: float) -> dict[str, Any]:
         "source": term.effect.source,
         "parameters": {
             key: {
-                "value": _rounded(e.value), "low": _rounded(e.low), "high": _rounded(e.high),
-                "unit": e.unit,
+                "value": _rounded(e.value, e.unit), "low": _rounded(e.low, e.unit),
+                "high": _rounded(e.high, e.unit), "unit": e.unit,
             }
             for key, e in finding.parameters.items()
         },
-        "relative_size": _rounded(term.relative_size),
+        "relative_size": _rounded(term.relative_size) if np.isfinite(finding.share) else None,
         "interval_s": None if term.interval == ALWAYS else [begin, end],
         "alternatives": [
             {"effect": name, "instrument": instrument, "log_likelihood_behind": _rounded(behind)}
-            for name, instrument, behind in finding.alternatives[:6]
+            for name, instrument, behind in alternatives
         ],
         "separate_by": {
             name: term.effect.confusable[name]
-            for name, _, _ in finding.alternatives
+            for name, _, _ in alternatives
             if name in term.effect.confusable
         },
     }

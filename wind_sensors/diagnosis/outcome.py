@@ -53,6 +53,7 @@ class Outcome:
         unexplained: What is left of what speaks.
         smallest_detectable: By effect and instrument: the least size that would have shown.
         station: The station with the named physics.
+        start: Of the recording [ns].
         length: Of the recording [s].
         reference: What took the place of a measured wind, for people.
         declined: What was seen and not claimed, and why.
@@ -68,6 +69,7 @@ class Outcome:
     unexplained: Unexplained
     smallest_detectable: Mapping[str, SmallestSize]
     station: Station
+    start: int
     length: float
     reference: str
     declined: tuple[str, ...] = ()

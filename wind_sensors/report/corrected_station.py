@@ -18,7 +18,11 @@ _DIGITS = 6
 
 
 def corrected_station(
-    recording: str, verdict: str, findings: Sequence[Finding], station: Station
+    recording: str,
+    verdict: str,
+    findings: Sequence[Finding],
+    station: Station,
+    start: int | None = None,
 ) -> str:
     """The text of the file.
 
@@ -27,6 +31,7 @@ def corrected_station(
         verdict: In one word.
         findings: Named effects, and members of ambiguous sets.
         station: The station with the named physics.
+        start: Of the recording [ns], where it lasts for days.
     """
     lines = [
         f"Written by `wind diagnose` (wind_sensors {wind_sensors.__version__}) of the recording "
@@ -36,9 +41,9 @@ def corrected_station(
         else "Nothing was named, so the constants are those of the station file.",
     ]
     for finding in findings:
-        sizes = "; ".join(size.text for size in sizes_of(finding, station))
+        sizes = "; ".join(size.text for size in sizes_of(finding, station, start))
         name = f"{words(finding.term.effect.name)} ({finding.term.instrument})"
-        when = when_text(finding.term)
+        when = when_text(finding.term, start)
         one = f", one of set {finding.set_number}" if finding.set_number else ""
         lines.append(f"- {name}{one}{f', {when}' if when else ''}: {sizes}")
     # A name may hold anything, and a comment ends with its line.

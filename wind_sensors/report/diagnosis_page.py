@@ -26,7 +26,7 @@ from wind_sensors.report.diagnosis_figures import (
     statistics_figure,
 )
 from wind_sensors.report.names import names_of, silence_of, words
-from wind_sensors.report.sizes import sizes_of, smallest_text
+from wind_sensors.report.sizes import LONG, moment_text, sizes_of, smallest_text
 from wind_sensors.station.model import Angle, Propeller, Rotor, Station
 from wind_sensors.station.silence import Silent
 
@@ -66,10 +66,18 @@ def _headline(diagnosis: Diagnosis) -> str:
     return headline[0].upper() + headline[1:]
 
 
-def when_text(term: Term) -> str:
-    """When an effect holds, for people; nothing where its sizes are its beginning and end."""
+def when_text(term: Term, start: int | None = None) -> str:
+    """When an effect holds, for people; nothing where its sizes are its beginning and end.
+
+    Args:
+        term: The effect.
+        start: Of the recording [ns]: late moments are told as dates. None: in s.
+    """
     if term.interval != ALWAYS:
         begin, end = term.interval
+        if start is not None and max(begin, end or 0.0) > LONG:
+            until = "" if end is None else f" to {moment_text(end, start)}"
+            return f"from {moment_text(begin, start)}{until}"
         return f"from {begin:.0f} s" + ("" if end is None else f" to {end:.0f} s")
     return "" if "start" in term.values else "all the time"
 

@@ -43,7 +43,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> list[Path]:
         UserError: Nothing can be written there.
     """
     station_text = corrected_station(
-        outcome.recording, outcome.verdict, outcome.findings, outcome.station
+        outcome.recording, outcome.verdict, outcome.findings, outcome.station, outcome.start
     )
     text, page = json.dumps(outcome_json(outcome), indent=1) + "\n", outcome_page(outcome)
     topics = _residual_topics(outcome)

@@ -9,7 +9,7 @@ from math import isfinite
 
 from matplotlib.figure import Figure
 
-from wind_sensors.diagnosis.effects.wording import number_text
+from wind_sensors.diagnosis.effects.wording import date_text, number_text
 from wind_sensors.diagnosis.outcome import Outcome, Panel
 from wind_sensors.diagnosis.proving.findings import Finding
 from wind_sensors.report import style
@@ -18,11 +18,16 @@ from wind_sensors.report.diagnosis_page import VERDICTS, document, silent_paragr
 from wind_sensors.report.names import names_of, silence_of, words
 from wind_sensors.report.removed import removed_text
 from wind_sensors.report.sizes import sizes_of, smallest_text
-from wind_sensors.station.model import Station
 
 
-def panel_figure(panels: list[Panel], width: float) -> Figure:
-    """Residuals before and after: one panel below the other, in a figure so wide [inch]."""
+def panel_figure(panels: list[Panel], start: int, width: float) -> Figure:
+    """Residuals before and after: one panel below the other.
+
+    Args:
+        panels: What is drawn.
+        start: Of the recording [ns], from which days count.
+        width: Of the figure [inch].
+    """
     with style.house():
         figure = Figure(figsize=(width, 2.3 * len(panels)), layout="constrained")
         axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
@@ -33,22 +38,23 @@ def panel_figure(panels: list[Panel], width: float) -> Figure:
                 linewidth=0.8, markersize=4, label="before",
             )
             axis.plot(panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after")
-            axis.set_xlabel(panel.axis)
+            since = f" since {date_text(start)}" if panel.axis == "day" else ""
+            axis.set_xlabel(f"{panel.axis}{since}")
             axis.set_ylabel(panel.unit)
             axis.set_title(title_for(width, panel.title), fontsize=10)
         axes[0].legend(loc="best", fontsize=8)
     return figure
 
 
-def _effects(findings: Sequence[Finding], station: Station) -> str:
+def _effects(outcome: Outcome) -> str:
     """One section for each effect, with all the instruments it was found on."""
     groups: dict[str, list[Finding]] = {}
-    for finding in findings:
+    for finding in outcome.findings:
         groups.setdefault(finding.term.effect.name, []).append(finding)
-    return "".join(_effect(group, station) for group in groups.values())
+    return "".join(_effect(group, outcome) for group in groups.values())
 
 
-def _effect(findings: Sequence[Finding], station: Station) -> str:
+def _effect(findings: Sequence[Finding], outcome: Outcome) -> str:
     effect = findings[0].term.effect
     rivals = {name for f in findings for name, _, _ in f.alternatives}
     others = "".join(
@@ -60,13 +66,13 @@ def _effect(findings: Sequence[Finding], station: Station) -> str:
         f"<section><h2>{escape(words(effect.name))}</h2><p>{escape(effect.meaning)}</p>"
         f"<span class='eq'>{escape(effect.equation)}</span>"
         f"<p class='muted'>{escape(effect.source)}</p>"
-        + "".join(_finding(f, station) for f in findings)
+        + "".join(_finding(f, outcome) for f in findings)
         + (f"<p>What would tell more:</p><ul>{others}</ul>" if others else "")
         + "</section>"
     )
 
 
-def _finding(finding: Finding, station: Station) -> str:
+def _finding(finding: Finding, outcome: Outcome) -> str:
     together = (
         f" (one of set {finding.set_number}: the data do not say which)"
         if finding.set_number
@@ -79,7 +85,7 @@ def _finding(finding: Finding, station: Station) -> str:
         else ""
     )
     chance = f"; p = {finding.p:.3g}" if isfinite(finding.p) else ""
-    sizes = "; ".join(size.text for size in sizes_of(finding, station))
+    sizes = "; ".join(size.text for size in sizes_of(finding, outcome.station, outcome.start))
     proof = ""
     if finding.proof is not None:
         removed = escape(removed_text(finding.proof))
@@ -114,7 +120,10 @@ def outcome_page(outcome: Outcome) -> str:
     """The report as one HTML file without outside references."""
     titles = list(dict.fromkeys(p.title for p in outcome.panels))
     figures = "".join(
-        in_both_cuts(partial(panel_figure, [p for p in outcome.panels if p.title == title]), title)
+        in_both_cuts(
+            partial(panel_figure, [p for p in outcome.panels if p.title == title], outcome.start),
+            title,
+        )
         for title in titles
     )
     calibrated = (
@@ -134,7 +143,7 @@ def outcome_page(outcome: Outcome) -> str:
         f"<p class='muted'>{escape(VERDICTS[outcome.verdict])}. Reference: "
         f"{escape(outcome.reference)}. {escape(calibrated)}</p>"
         f"{silent_paragraphs(outcome.silent)}</header>",
-        _effects(outcome.findings, outcome.station),
+        _effects(outcome),
         f"<section><h2>Before and after</h2><p class='muted'>Orange: recorded minus simulated as "
         f"described; bars are two standard errors. Blue: with all that was fitted, also what is "
         f"too small or too ambiguous for the corrected station.</p>{figures}"

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.signal import welch
 
+from wind_sensors.diagnosis.effects.wording import date_text
 from wind_sensors.motion.frames import compass_from_yaw, direction_from_deg, heading_of
 from wind_sensors.report import style
 from wind_sensors.station.model import Cup, Propeller
@@ -333,8 +334,7 @@ def _time_axis(recording: Recording, panel: Axes, span: tuple[float, float]) -> 
     panel.set_xlim(span)
     since = "the start"
     if unit != 1.0:
-        start = np.datetime_as_string(np.datetime64(recording.start, "ns"), unit="m")
-        since = f"{start.replace('T', ' ')} UTC"
+        since = date_text(recording.start)
         panel.xaxis.set_major_locator(_InUnits(unit))
         panel.xaxis.set_major_formatter(lambda seconds, _: f"{seconds / unit:g}")
     panel.set_xlabel(f"time since {since} [{name}]")

@@ -1,4 +1,4 @@
-"""Sizes of effects for people: with units, bearings from north or the bow, long times in days."""
+"""Sizes of effects for people: units, bearings from north or the bow, late moments as dates."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wind_sensors.diagnosis.effects.smallest_size import SmallestSize
-from wind_sensors.diagnosis.effects.wording import BEARING, clockwise, counted_from, number_text
+from wind_sensors.diagnosis.effects.wording import (
+    BEARING,
+    clockwise,
+    counted_from,
+    date_text,
+    number_text,
+)
 from wind_sensors.diagnosis.proving.findings import Estimate, Finding
 from wind_sensors.report.names import words
 from wind_sensors.station.model import Station
@@ -15,7 +21,10 @@ from wind_sensors.station.model import Station
 DAY = 86400.0
 
 LONG = 3.0 * DAY
-"""Times from here on [s] are told in days."""
+"""Moments later than this [s] are told as dates."""
+
+MOMENTS = ("start", "stop")
+"""Parameters that are moments."""
 
 
 @dataclass(frozen=True)
@@ -36,18 +45,29 @@ class Size:
         return f"{self.name} {self.value}{unit}{interval}"
 
 
+def moment_text(elapsed: float, start: int) -> str:
+    """A moment of a long recording, as a date.
+
+    Args:
+        elapsed: Since its start [s].
+        start: Its start [ns].
+    """
+    return date_text(start + round(elapsed * 1e9))
+
+
 def smallest_text(size: SmallestSize) -> str:
     """A smallest size with its parameter and its unit."""
     unit = "(share)" if size.unit == "1" else size.unit
     return f"{words(size.parameter)} {number_text(size.value)} {unit}".strip()
 
 
-def sizes_of(finding: Finding, station: Station) -> list[Size]:
+def sizes_of(finding: Finding, station: Station, start: int | None = None) -> list[Size]:
     """Parameters of a finding as they are printed.
 
     Args:
         finding: The finding.
         station: Tells whether headings count from north or from the bow.
+        start: Of the recording [ns]: from a few days on moments are told as dates. None: in s.
     """
     either_or = {
         p.name
@@ -58,18 +78,18 @@ def sizes_of(finding: Finding, station: Station) -> list[Size]:
     return [
         Size(words(name), "yes" if e.value == 1.0 else "no", "", "", "")
         if name in either_or
-        else _size(name, e, station, senses.get(name, ""))
+        else _size(name, e, station, start, senses.get(name, ""))
         for name, e in finding.parameters.items()
     ]
 
 
-def _size(name: str, e: Estimate, station: Station, sense: str) -> Size:
+def _size(name: str, e: Estimate, station: Station, start: int | None, sense: str) -> Size:
     if name == BEARING:
         return _bearing(e, station)
     known = np.isfinite(e.low)
-    if e.unit == "s" and abs(e.value) > LONG:
-        ends = (f"{e.low / DAY:.2f}", f"{e.high / DAY:.2f}") if known else ("", "")
-        return Size(words(name), f"{e.value / DAY:.2f}", *ends, "days after the first mean")
+    if start is not None and name in MOMENTS and abs(e.value) > LONG:
+        ends = (moment_text(e.low, start), moment_text(e.high, start)) if known else ("", "")
+        return Size(words(name), moment_text(e.value, start), *ends, "")
     ends = (number_text(e.low), number_text(e.high)) if known else ("", "")
     unit = "" if e.unit == "1" else e.unit
     return Size(words(name), number_text(e.value), *ends, f"{unit}, {sense}" if sense else unit)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import isfinite
 
+import numpy as np
+
 from wind_sensors.diagnosis.effects.definition import Parameter
 from wind_sensors.station.model import Station
 
@@ -20,6 +22,12 @@ def number_text(value: float, digits: int = 3) -> str:
             ten.
     """
     return f"{float(f'{value:.{digits}g}'):g}" if isfinite(value) else "?"
+
+
+def date_text(time_ns: int) -> str:
+    """A moment [ns] to the minute."""
+    minute = np.datetime_as_string(np.datetime64(time_ns, "ns"), unit="m")
+    return f"{minute.replace('T', ' ')} UTC"
 
 
 def clockwise(bearing_deg: float, station: Station) -> float:

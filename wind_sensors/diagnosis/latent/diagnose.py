@@ -124,6 +124,7 @@ def diagnose_latent(
         unexplained=Unexplained(explained.p, 0.0, (), ""),
         smallest_detectable=_smallest(bench, after),
         station=corrected(station, to_plant),
+        start=recording.start,
         length=(recording.stop - recording.start) * 1e-9,
         reference=f"latent: the earth wind, constant with a trend within {BLOCK:.0f} s; "
         f"{turning} of {spread.size} blocks show several headings",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from wind_sensors.diagnosis.effects.wording import date_text
 from wind_sensors.errors import UserError
 from wind_sensors.simulation.drive import air_density
 from wind_sensors.station.doubles import without_doubles
@@ -63,6 +64,10 @@ class Averages:
 
     def __len__(self) -> int:
         return int(self.time.size)
+
+    def date(self, elapsed: float) -> str:
+        """A moment [s since the start of the recording], for people."""
+        return date_text(int(self.time[0]) + round((elapsed - float(self.elapsed[0])) * 1e9))
 
     def intensity(self, rotor: str) -> FloatArray:
         """Turbulence intensity at a rotor [1], shape (n,)."""

@@ -133,6 +133,7 @@ def diagnose_means(
         unexplained=left,
         smallest_detectable={key: s for each in told for key, s in each.smallest.items()},
         station=corrected(recording.station, findings),
+        start=recording.start,
         length=(recording.stop - recording.start) * 1e-9,
         reference="borrowed: the rotors of a pair and the vanes are each other's reference",
         declined=(*declined, *uncorrected(findings)),
@@ -260,7 +261,7 @@ def _of_vane(
         found.bench, effects, (vane,), report, MOST_OF_A_VANE,
         (turning,) if healthy is None else (),
     )
-    findings, declined = findings_of_vane(found, explained, standing, number)
+    findings, declined = findings_of_vane(averages, found, explained, standing, number)
     after = planted(station, explained.terms)
     return _Told(findings, declined, [panels.of_vane(found, station, after)])
 

@@ -17,7 +17,7 @@ from wind_sensors.diagnosis.effects.wording import (
     parameter_text,
 )
 from wind_sensors.diagnosis.explaining.terms import ALWAYS, Term, planted
-from wind_sensors.diagnosis.means.averages import DAY, Averages
+from wind_sensors.diagnosis.means.averages import Averages
 from wind_sensors.diagnosis.means.bench import Bench, FloatArray, block_sums, halves, huber
 from wind_sensors.diagnosis.means.detectable import smallest_size
 from wind_sensors.diagnosis.means.fits import fit, intervals
@@ -101,6 +101,11 @@ def _estimates(term: Term, limits: dict[str, tuple[float, float]]) -> dict[str, 
     return out
 
 
+def _span(averages: Averages, begin: float, end: float) -> str:
+    """From one moment to another [s since the start of the recording], for people."""
+    return f"from {averages.date(begin)} to {averages.date(end)}"
+
+
 def _place(work: PairWork, term: Term, before: FloatArray) -> Found:
     """Where a term of a pair acts, and how large the mismatch is there."""
     pair = work.pair
@@ -125,7 +130,7 @@ def _place(work: PairWork, term: Term, before: FloatArray) -> Found:
             inside &= work.pair.averages.elapsed < end
         last = float(pair.averages.elapsed[-1]) if end is None else end
         region = Region(
-            channel, "time", begin, last, f"from day {begin / DAY:.0f} to day {last / DAY:.0f}"
+            channel, "time", begin, last, _span(pair.averages, begin, last)
         )
     elif term.effect.name in {"bearing_friction", "calibration_offset"}:
         inside = speed < CALM
@@ -241,7 +246,7 @@ def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
     )
     region = Region(
         f"{silence.sensor}/{'mean_speed' if is_rotor else 'mean_direction'}", "time", begin, end,
-        f"{shown} from day {begin / DAY:.2f} to day {end / DAY:.2f}, "
+        f"{shown} {_span(averages, begin, end)}, "
         f"{silence.rows} means of it in wind",
     )
     unit = "m/s" if is_rotor else "deg"
@@ -271,7 +276,9 @@ def finding_of_ice(averages: Averages, ice: Ice) -> Finding:
         f"{ice.rotor}/mean_speed", "temperature", -40.0, COLD,
         f"{len(ice.episodes)} episodes, {ice.rows * hours:.1f} h of {ice.cold_rows * hours:.0f} h "
         f"of wind below {COLD:g} degC; {ice.warm_slow * hours:.1f} h of "
-        f"{ice.warm_rows * hours:.0f} h above {WARM:g} degC",
+        f"{ice.warm_rows * hours:.0f} h above {WARM:g} degC; in them it turned at "
+        f"{100.0 * ice.ratio:.0f} % of the speed that {ice.partner} leads to expect (median)"
+        f"{', that is, stood still for most of the time' if ice.ratio == 0.0 else ''}",
     )
     there = np.concatenate([averages.speed[ice.partner][a : b + 1] for a, b in ice.episodes])
     missing = float(np.nanmean(there)) * (ice.ratio - 1.0)
@@ -287,7 +294,11 @@ def finding_of_ice(averages: Averages, ice: Ice) -> Finding:
 
 
 def findings_of_vane(
-    found: VaneBench, explained: Explained, standing: VaneStanding | None, number: int | None
+    averages: Averages,
+    found: VaneBench,
+    explained: Explained,
+    standing: VaneStanding | None,
+    number: int | None,
 ) -> tuple[list[Finding], list[str]]:
     """Findings of a vane against the others, and what was declined.
 
@@ -295,6 +306,7 @@ def findings_of_vane(
     much of the misfit that is: the share that a finding removes is of all of it.
 
     Args:
+        averages: Means of the recording.
         found: The vane.
         explained: What the search says.
         standing: What healthy recordings show of it, if there are any.
@@ -331,7 +343,7 @@ def findings_of_vane(
         last = float(bench.elapsed[-1]) if end is None else end
         region = Region(
             f"{found.vane}/mean_direction", "time", begin, last,
-            f"from day {begin / DAY:.0f} to day {last / DAY:.0f}",
+            _span(averages, begin, last),
         )
         out.append(
             Finding(
