@@ -39,7 +39,7 @@ def main() -> None:
         shown = panels.of_pair(pair, recording.station, corrected)
         with style.house():
             target = options.output / f"means_{first}_{second}.png"
-            panel_figure(shown[:2], WIDTH).savefig(target, dpi=80)
+            panel_figure(shown[:2], recording.start, WIDTH).savefig(target, dpi=80)
         print(f"wrote {target}")
 
 

@@ -561,7 +561,7 @@ def mast_of_means(rows: int = 5000) -> Recording:
     heading = np.radians(90.0 + 8.0 * rng.standard_normal(rows))
     return replace(
         quick, station=station, stop=int(time[-1]), reference=None,
-        pulses={one["name"]: Pulses(time, turns) for one in made},
+        pulses={f"cup_{n}0_north_of_the_mast": Pulses(time, turns) for n in range(1, 7)},
         angles={"vane": Angles(time, heading)},
     )
 

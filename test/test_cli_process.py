@@ -7,11 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from estimation_cases import mast
 from test_cli import steady_recording
 from test_output_topics import window
 
 from wind_sensors.cli.main import main
 from wind_sensors.estimation.bias_terms import WindowTurbulence, array_terms
+from wind_sensors.estimation.constants import told_by
 from wind_sensors.estimation.core import SmallScales
 from wind_sensors.recordings import write_recording
 from wind_sensors.report.window_table import bias_quantities, wind_quantities
@@ -37,7 +39,7 @@ def test_brackets_are_told_as_they_are(
 ) -> None:
     assert main(["process", str(recorded), "-o", str(tmp_path / "wind"), *NAIVE]) == 0
     told = capsys.readouterr().out
-    assert told.startswith("cal[red]m, naive")
+    assert told.startswith("cal[red]m, naive: wind of cup, vane [north]; raw speed of cup")
     assert "[s]" in told and "[m/s]" in told and "[deg]" in told
     assert "±: standard uncertainty" in told
     assert "propeller" not in told, "a cup has no translation of its propeller"
@@ -62,6 +64,16 @@ def test_windows_are_a_table_for_spreadsheets(tmp_path: Path, recorded: Path) ->
     )
     assert "bias: arithmetic mean [% of mean speed]" in first
     assert "raw mean speed [m/s]" in first
+    assert first["raw speed of"] == "cup"
+
+
+def test_the_title_tells_whose_wind_it_is() -> None:
+    station = mast()
+    cup = station.instrument("cup")
+    other = cup.model_copy(update={"name": "other"})
+    both = station.model_copy(update={"instruments": (*station.instruments, other)})
+    assert told_by(both, "kalman") == ("cup", "other", "vane")
+    assert told_by(both, "naive") == told_by(both, "inverse") == ("cup", "vane")
 
 
 def test_on_board_the_raw_speed_is_told_as_what_is_felt() -> None:

@@ -24,7 +24,7 @@ from wind_sensors.estimation import (
     must_compile,
     process,
 )
-from wind_sensors.estimation.constants import measures_vertical
+from wind_sensors.estimation.constants import measures_vertical, told_by
 from wind_sensors.recordings import write_recording
 from wind_sensors.recordings.bag import TopicData
 from wind_sensors.recordings.other_topics import OtherTopics
@@ -86,8 +86,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--method",
         choices=METHODS,
         default=defaults.method,
-        help="kalman: turbulence and instruments as one stochastic model; inverse: the equations "
-        "solved for the wind; naive: the calibration alone, for comparison (default: %(default)s)",
+        help="kalman: turbulence and all rotors and vanes as one stochastic model; inverse: the "
+        "equations solved for the wind, of the first rotor and its vane or of an array; naive: "
+        "their calibration alone, for comparison (default: %(default)s)",
     )
     for name, kind, unit, meaning in (
         ("window", seconds, "s", "averaging time of means, biases and direction variance"),
@@ -195,7 +196,7 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
     station = result.recording.station
     with_vertical, on_board = measures_vertical(station), station.platform is not None
     components = "uvw" if with_vertical else "uv"
-    table = Table(title=f"{result.recording.name}, {result.method}", title_justify="left")
+    table = Table(title=_title(result), title_justify="left")
     table.add_column("window\n[s]")
     turbulence = f"turbulence {', '.join(components)}\n[m/s]"
     for heading in ("mean speed\n[m/s]", "vector mean\n[m/s]", "from\n[deg]", turbulence,
@@ -231,6 +232,17 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
         console.print(_SPEED_ABOVE_VECTOR)
     if "arithmetic_mean" in terms:
         console.print(_ARITHMETIC_MEAN)
+
+
+def _title(result: ProcessedRecording) -> str:
+    """Whose signals the wind is told by, and whose count the raw speed."""
+    station = result.recording.station
+    used = told_by(station, result.method)
+    unused = [i.name for i in station.instruments if i.name not in used]
+    text = f"{result.recording.name}, {result.method}: wind of {', '.join(used)}"
+    if unused:
+        text += f"; not used: {', '.join(unused)}"
+    return f"{text}; raw speed of {result.windows[0].instrument}"
 
 
 def _span(window: WindowStatistics, start: int) -> str:

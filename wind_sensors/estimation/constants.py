@@ -50,6 +50,31 @@ def axes_of(station: Station) -> tuple[NoseAxis, ...]:
     return tuple(axes)
 
 
+def counted_pair(station: Station) -> tuple[Cup | Propeller, NoseAxis]:
+    """The rotor whose run is counted and the nose that tells its direction.
+
+    They are the first rotor, and the vane that carries it or else the first one.
+
+    Args:
+        station: With a vane or bivane.
+    """
+    rotor, axes = rotors_of(station)[0], axes_of(station)
+    carried_by = getattr(rotor, "mounted_on", "")
+    return rotor, next((a for a in axes if a.name == carried_by), axes[0])
+
+
+def told_by(station: Station, method: str) -> tuple[str, ...]:
+    """Names of the instruments whose signals a method takes for the wind."""
+    if method == "kalman":
+        every = (*rotors_of(station), *(a.instrument for a in axes_of(station)))
+    elif is_array(station):
+        every = fixed_propellers_of(station)
+    else:
+        rotor, nose = counted_pair(station)
+        every = (rotor, nose.instrument)
+    return tuple(dict.fromkeys(i.name for i in every))
+
+
 def fixed_propellers_of(station: Station) -> tuple[Propeller, ...]:
     """Propellers that do not turn with the wind."""
     return tuple(

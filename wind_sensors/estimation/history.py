@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from wind_sensors.estimation.constants import axes_of, rotors_of
+from wind_sensors.estimation.constants import axes_of, counted_pair, rotors_of
 from wind_sensors.estimation.intake import Block, Series
 from wind_sensors.estimation.readings import NoseReader
 from wind_sensors.estimation.timeline import Timeline
@@ -159,11 +159,10 @@ class History:
     def __init__(
         self, station: Station, origin: int, seconds: float, restored: bool = True
     ) -> None:
-        self.edges = RotorTrack(rotors_of(station)[0].name, station, origin, restored)
+        rotor, nose = counted_pair(station)
+        self.edges = RotorTrack(rotor.name, station, origin, restored)
         self.rotor = self.edges.rotor
-        carried_by = getattr(self.rotor, "mounted_on", "")
         axes = axes_of(station)
-        nose = next((a for a in axes if a.name == carried_by), axes[0])
         self.vane = nose.instrument
         self.nose_number = axes.index(nose)
         self._keep = round(seconds * 1e9)

@@ -113,10 +113,13 @@ def windows_csv(result: ProcessedRecording) -> str:
             for bias in biases
         ]
         if number == 0:
-            table.writerow(["start [UTC]", "stop [UTC]", "data [%]", *_headings(quantities)])
+            table.writerow(
+                ["start [UTC]", "stop [UTC]", "data [%]", *_headings(quantities), "raw speed of"]
+            )
         table.writerow(
             [_utc(window.start), _utc(window.stop), _number(100.0 * window.complete)]
             + [_number(n) for q in quantities for n in (q.value, q.uncertainty) if n is not None]
+            + [window.instrument]
         )
     return text.getvalue()
 
