@@ -249,8 +249,8 @@ def test_a_sensor_that_stands_in_the_wind_is_stuck_and_takes_no_part() -> None:
     assert all(f.term.effect.name == "stuck_sensor" for f in found.values())
     assert found["vane_a"].term.values["start"] == pytest.approx(2500 * 600.0, abs=1300.0)
     assert found["two_b"].term.values["start"] == pytest.approx(3000 * 600.0, abs=1300.0)
-    # Rows of ten minutes from 1970 on.
-    assert found["two_b"].located.region.label.startswith("0 m/s from 1970-01-21 20:00 UTC to ")
+    # Rows of ten minutes from 1970 on: that at 20:00 began ten minutes earlier.
+    assert found["two_b"].located.region.label.startswith("0 m/s from 1970-01-21 19:50 UTC to ")
     assert "stuck sensor" in outcome_page(outcome) and "since 1970-01-01 00:00 UTC" in outcome_page(
         outcome
     )

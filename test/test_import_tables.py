@@ -106,6 +106,41 @@ def test_what_cannot_be_read_is_shown_with_its_line_and_a_remedy(tmp_path: Path)
     assert "1 lines without a readable time" in refused(tmp_path, "t,D\n,45\n", mapping_with())
 
 
+def test_rows_of_another_width_are_no_missing_rows(tmp_path: Path) -> None:
+    told = refused(tmp_path, "t,D,extra\n" + "2024-06-01T00:00:00,45\n" * 600, mapping_with())
+    assert "600 lines have 2 columns and not the 3 of the header" in told
+    assert "no rows" not in told
+
+
+def test_a_missing_file_is_told_in_words(tmp_path: Path) -> None:
+    with pytest.raises(UserError) as caught:
+        import_files([tmp_path / "none.csv"], read_mapping(mapping_with(), "map.yaml"))
+    assert "there is no such file" in str(caught.value) and "Errno" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ("format: csv", "fromat: csv", "unknown key. Did you mean `format`?"),
+        ("format: csv", "fromat: csv", "format: missing. Add `format: ...`."),
+        ("topic: /", "topik: /", "Did you mean `topic`?"),
+        ("direction: from_north", "direction: from_nord",
+         "'from_nord' is not one of the choices. Choose 'from_north' or 'from_bow'. Did you mean "
+         "'from_north'?"),
+    ],
+)
+def test_slips_in_a_mapping_are_told_as_those_in_a_station_file(
+    right: str, wrong: str, told: str
+) -> None:
+    signals = "- {column: D, direction: from_north, topic: /v}"
+    mapping = mapping_with(signals=signals)
+    assert right in mapping
+    with pytest.raises(UserError) as caught:
+        read_mapping(mapping.replace(right, wrong, 1), "map.yaml")
+    assert told in str(caught.value)
+    assert "Input should be" not in str(caught.value)
+
+
 def test_sixteen_bit_text_is_read(tmp_path: Path) -> None:
     file = tmp_path / "wide.csv"
     file.write_bytes("t,D\n2024-06-01T00:00:00,45\n".encode("utf-16"))
@@ -133,7 +168,7 @@ def test_what_no_wind_can_be_is_left_out_and_counted(tmp_path: Path) -> None:
         (mapping_with(zone="+1"), "'1' is not a time zone"),
         (
             mapping_with(signals="- {column: V, unit: degC, topic: /cup}"),
-            "map.yaml:5: signals.0.unit",
+            "map.yaml:5: signals[0].unit",
         ),
         (
             mapping_with("vectors: [{topic: /wind, speed: {column: V, unit: hPa}, "

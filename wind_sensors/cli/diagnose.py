@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from rich.console import Console
@@ -98,10 +99,12 @@ def catalogue_without(names: Sequence[str]) -> dict[str, Effect]:
     known = catalogue()
     unknown = sorted(set(names) - set(known))
     if unknown:
+        close = [get_close_matches(name, known, n=1) for name in unknown]
+        guess = f"Did you mean {' and '.join(c[0] for c in close)}?" if all(close) else (
+            f"The effects are {', '.join(sorted(known))}."
+        )
         raise UserError(
-            f"no effect is called {', '.join(map(repr, unknown))}.",
-            "--without",
-            f"The effects are {', '.join(sorted(known))}.",
+            f"no effect is called {', '.join(map(repr, unknown))}.", "--without", guess
         )
     return {name: effect for name, effect in known.items() if name not in names}
 

@@ -68,8 +68,11 @@ def read_text(path: Path) -> str:
         data = path.read_bytes()
         if data.startswith(_GZIP):
             data = gzip.decompress(data)
+    except FileNotFoundError:
+        raise UserError("there is no such file.", str(path), "Check the path.") from None
     except (OSError, EOFError) as problem:
-        raise UserError(f"the file cannot be read ({problem}).", str(path)) from None
+        said = getattr(problem, "strerror", None) or problem
+        raise UserError(f"the file cannot be read ({said}).", str(path)) from None
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return data.decode("utf-16" if wide else "utf-8-sig", errors="replace")
 
@@ -100,6 +103,7 @@ def read_table(path: Path, mapping: Mapping) -> Table:
     time_place = names.index(mapping.time.column)
     faults: Counter[str] = Counter()
     notes: list[str] = []
+    widths: Counter[int] = Counter()
     rows: list[list[str]] = []
     numbers: list[int] = []
     reader = csv.reader(lines[first:], delimiter=delimiter)
@@ -109,7 +113,14 @@ def read_table(path: Path, mapping: Mapping) -> Table:
             numbers.append(first + reader.line_num)
         elif row:
             faults["lines with a wrong number of columns"] += 1
-    if not rows:
+            widths[len(row)] += 1
+    if widths:
+        width, count = widths.most_common(1)[0]
+        notes.append(
+            f"{path.name}: {'one line has' if count == 1 else f'{count} lines have'} {width} "
+            f"columns and not the {len(names)} of the header"
+        )
+    elif not rows:
         notes.append(f"{path.name}: the table has no rows")
     local, known = _stamps([row[time_place] for row in rows], mapping.time.format)
     unread = known.count(False)

@@ -16,6 +16,7 @@ from wind_sensors.recordings.station_files import shipped_profiles
 from wind_sensors.station.document import Document, parse
 from wind_sensors.station.inputs import absolute
 from wind_sensors.station.model import Entry, Input, Rotor, Station, Vane
+from wind_sensors.station.problems import Problem, problem_of
 from wind_sensors.station.reading import station_of
 from wind_sensors.station.reference import entries_markdown
 
@@ -279,22 +280,21 @@ def read_mapping(text: str, name: str) -> MappingFile:
     except ValidationError as error:
         details = error.errors(include_url=False)
         raise _refused(
-            document,
-            [(tuple(d["loc"]), d["msg"].removeprefix("Value error, ")) for d in details],
+            document.name, [problem_of(detail, document, given, Mapping) for detail in details]
         ) from None
-    wrong = list(_wrong_units(mapping, station))
+    wrong = [
+        Problem(document.where(path), path, f"{fault}.", "")
+        for path, fault in _wrong_units(mapping, station)
+    ]
     if wrong:
-        raise _refused(document, wrong)
+        raise _refused(document.name, wrong)
     return MappingFile(mapping, station, _dumped(YAML(typ="rt").load(text)["station"]))
 
 
-def _refused(document: Document, faults: list[tuple[tuple[int | str, ...], str]]) -> UserError:
-    told = [
-        f"\n  {document.where(path)}: {'.'.join(str(step) for step in path)}: {message}."
-        for path, message in faults
-    ]
-    count = "one problem" if len(told) == 1 else f"{len(told)} problems"
-    return UserError(f"{count}:{''.join(told)}", document.name)
+def _refused(name: str, problems: list[Problem]) -> UserError:
+    told = "".join(f"\n  {problem}" for problem in problems)
+    count = "one problem" if len(problems) == 1 else f"{len(problems)} problems"
+    return UserError(f"{count}:{told}", name)
 
 
 def _wrong_units(

@@ -1,13 +1,16 @@
-"""What is wrong with a station file, in words: place, key, fault, remedy."""
+"""What is wrong with a station or mapping file, in words: place, key, fault, remedy."""
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
+from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from wind_sensors.station.document import Document, Path
+from wind_sensors.station.model import Station
 from wind_sensors.station.schema import KINDS, entry_at, field_at, meaning
 
 
@@ -87,16 +90,19 @@ FLOORS: dict[str, Floor] = {
 }
 
 
-def problem_of(error: ErrorDetails, document: Document, given: Any) -> Problem:
+def problem_of(
+    error: ErrorDetails, document: Document, given: Any, root: type[BaseModel] = Station
+) -> Problem:
     """One fault found by the schema, in words.
 
     Args:
         error: As pydantic tells it.
         document: The text, for the lines.
         given: The data that was validated (with the constants of profiles filled in).
+        root: The model of the document.
     """
     path = plain_path(error["loc"], given)
-    what, remedy = _words(error, path, given)
+    what, remedy = _words(error, path, given, root)
     return Problem(document.where(path), path, what, remedy)
 
 
@@ -135,14 +141,16 @@ def plain_path(location: tuple[int | str, ...], data: Any) -> Path:
     return tuple(path)
 
 
-def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:
+def _words(
+    error: ErrorDetails, path: Path, data: Any, root: type[BaseModel]
+) -> tuple[str, str]:
     kind = error["type"]
     context = error.get("ctx", {})
-    told = meaning(field_at(path, data))
+    told = meaning(field_at(path, data, root))
     about = f"It is: {told}" if told else ""
     given = error["input"]
     if kind == "extra_forbidden":
-        return _unknown_key(path, data)
+        return _unknown_key(path, data, root)
     if kind == "missing":
         what = "missing"
         if path and path[-1] == "kind":
@@ -156,7 +164,11 @@ def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:
         guess = f" Did you mean '{close[0]}'?" if close else ""
         return f"there is no instrument of kind '{tag}'.", f"Kinds: {', '.join(KINDS)}.{guess}"
     if kind == "literal_error":
-        return f"'{given}' is not one of the choices.", f"Choose {context.get('expected')}."
+        # An empty choice is what stands where the key is left out.
+        expected = str(context.get("expected")).removeprefix("'', ").removeprefix("'' or ")
+        close = get_close_matches(str(given), re.findall("'([^']+)'", expected), n=1)
+        guess = f" Did you mean '{close[0]}'?" if close else ""
+        return f"'{given}' is not one of the choices.", f"Choose {expected}.{guess}"
     if kind in {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}:
         relation = {
             "greater_than": ("above", "gt"),
@@ -182,8 +194,8 @@ def _words(error: ErrorDetails, path: Path, data: Any) -> tuple[str, str]:
     return f"{error['msg']}.", about
 
 
-def _unknown_key(path: Path, data: Any) -> tuple[str, str]:
-    model = entry_at(path[:-1], data)
+def _unknown_key(path: Path, data: Any, root: type[BaseModel]) -> tuple[str, str]:
+    model = entry_at(path[:-1], data, root)
     known = list(model.model_fields) if model is not None else []
     close = get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
     if close:

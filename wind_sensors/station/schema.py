@@ -25,17 +25,20 @@ def models_in(annotation: Any) -> list[type[BaseModel]]:
     return [model for part in get_args(annotation) for model in models_in(part)]
 
 
-def entry_at(path: Path, data: Any) -> type[BaseModel] | None:
+def entry_at(
+    path: Path, data: Any, root: type[BaseModel] = Station
+) -> type[BaseModel] | None:
     """The model of the entry at a path of the document.
 
     Args:
         path: Keys and indices without the tags that pydantic adds.
         data: The document, for the `kind` of instruments.
+        root: The model of the document.
 
     Returns:
         The model; None where the path does not lead to an entry.
     """
-    model: type[BaseModel] = Station
+    model = root
     for step in path:
         data = _child(data, step)
         if isinstance(step, int):
@@ -58,13 +61,13 @@ def _child(data: Any, step: str | int) -> Any:
     return None
 
 
-def field_at(path: Path, data: Any) -> FieldInfo | None:
-    """The declaration of the key at a path; None where there is none."""
+def field_at(path: Path, data: Any, root: type[BaseModel] = Station) -> FieldInfo | None:
+    """The declaration of the key at a path; None where there is none. Arguments as `entry_at`."""
     names = [step for step in path if isinstance(step, str)]
     if not names:
         return None
     last = max(index for index, step in enumerate(path) if isinstance(step, str))
-    model = entry_at(path[:last], data)
+    model = entry_at(path[:last], data, root)
     return model.model_fields.get(names[-1]) if model is not None else None
 
 

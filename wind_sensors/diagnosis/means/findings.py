@@ -246,7 +246,7 @@ def finding_of_silence(averages: Averages, silence: Silence) -> Finding:
     )
     region = Region(
         f"{silence.sensor}/{'mean_speed' if is_rotor else 'mean_direction'}", "time", begin, end,
-        f"{shown} {_span(averages, begin, end)}, "
+        f"{shown} {_span(averages, begin - averages.interval, end)}, "
         f"{silence.rows} means of it in wind",
     )
     unit = "m/s" if is_rotor else "deg"
