@@ -48,6 +48,17 @@ def test_brackets_are_told_as_they_are(
     assert told.startswith("cal[red]m ") and "vane [north] " in told
 
 
+def test_a_long_list_of_windows_is_cut_on_the_screen_and_whole_in_the_file(
+    tmp_path: Path, recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "wind"
+    command = ["process", str(recorded), "-o", str(out), "--method", "naive", "--window", "2"]
+    assert main(command) == 0
+    told = capsys.readouterr().out
+    assert "the first 40 of 60 windows; windows.csv has all of them" in told
+    assert len((out / "windows.csv").read_text(encoding="utf-8").splitlines()) == 61
+
+
 def test_windows_are_a_table_for_spreadsheets(tmp_path: Path, recorded: Path) -> None:
     assert main(["process", str(recorded), "-o", str(tmp_path / "wind"), *NAIVE]) == 0
     with (tmp_path / "wind" / "windows.csv").open(encoding="utf-8", newline="") as file:

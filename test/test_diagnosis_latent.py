@@ -9,6 +9,8 @@ import pytest
 
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent
 from wind_sensors.errors import UserError
+from wind_sensors.report.diagnosis_page import VERDICTS
+from wind_sensors.report.outcome_page import outcome_page, panel_figure
 from wind_sensors.station.model import Station
 from wind_sensors.station.signals import Angles, PlatformStates, Pulses, Recording
 
@@ -104,7 +106,17 @@ def test_nothing_is_named_on_a_boat_as_described(seed: int) -> None:
     outcome = diagnose_latent(boat(seed + 20))
     assert outcome.verdict == "none"
     assert not outcome.findings
-    assert any("vane offset" in line for line in outcome.declined)
+    (line,) = (line for line in outcome.declined if line.startswith("vane offset"))
+    assert "lowers the misfit by" in line or "raises the misfit by" in line
+    assert "needed)" in line and "counter-clockwise positive" in line
+    # What was declined has a size that would have shown.
+    assert {"vane_offset/vane", "calibration_drift/cup"} <= set(outcome.smallest_detectable)
+    text = outcome_page(outcome)
+    assert text.count(VERDICTS["none"]) == 1
+    assert "Nothing that matters" not in text
+    (figure,) = {p.title for p in outcome.panels}
+    drawn = panel_figure(list(outcome.panels), outcome.start, 9.0)
+    assert not any(axis.get_legend() for axis in drawn.axes) and drawn.legends, figure
 
 
 def test_a_turned_vane_is_not_told_from_a_compass_where_the_velocity_is_the_earths() -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress, TaskID
-from rich.table import Table
 from rich.text import Text
 
 from wind_sensors.cli.baseline import learnt, workers
+from wind_sensors.cli.findings import print_finding
 from wind_sensors.cli.other_references import diagnose_otherwise, other_reference
 from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.effects import catalogue
@@ -123,30 +123,16 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
         console.print(Text.assemble(("silent", "bold red"), f" {silent.words}"))
     print_notes(console, diagnosis.comparison.recording.notes)
     if diagnosis.findings:
-        table = Table(box=None)
-        for column in ("effect", "instrument", "when", "size", "95 % interval", "held out"):
-            table.add_column(column, overflow="fold", no_wrap=column == "effect")
-        for finding in diagnosis.findings:
+        for f in diagnosis.findings:
             removed = ""
-            if finding.proof is not None:
-                proof = finding.proof
-                removed = (
-                    f"{100.0 * proof.excess_removed:.0f} % "
-                    f"({100.0 * proof.low:.0f} to {100.0 * proof.high:.0f} %)"
-                )
-            for k, size in enumerate(sizes_of(finding, diagnosis.station)):
-                table.add_row(
-                    finding.term.effect.name if k == 0 else "",
-                    finding.term.instrument if k == 0 else "",
-                    when_text(finding.term) if k == 0 else "",
-                    f"{size.name} {size.value} {size.unit}".rstrip(),
-                    f"{size.low} to {size.high}" if size.low else "",
-                    removed if k == 0 else "",
-                )
-        console.print(table)
+            if f.proof is not None:
+                removed = f"{100.0 * f.proof.excess_removed:.0f} % "
+                removed += f"({100.0 * f.proof.low:.0f} to {100.0 * f.proof.high:.0f} %)"
+            sizes = sizes_of(f, diagnosis.station)
+            print_finding(console, f, sizes, when_text(f.term), removed)
         console.print(
-            "held out: share of the excess misfit removed on data that were not fitted, with its "
-            "95 % interval"
+            "in brackets: 95 % intervals; held out: share of the excess misfit, on data that were "
+            "not fitted"
         )
     if diagnosis.unexplained.description:
         console.print(f"left over: {diagnosis.unexplained.description}")

@@ -10,6 +10,7 @@ from rich.progress import Progress, TaskID
 from rich.text import Text
 
 from wind_sensors.cli.baseline import read_healthy
+from wind_sensors.cli.findings import print_finding
 from wind_sensors.cli.screen import screen
 from wind_sensors.diagnosis.latent.diagnose import diagnose_latent, is_latent
 from wind_sensors.diagnosis.means.diagnose import diagnose_means, is_of_means
@@ -110,21 +111,16 @@ def print_outcome(console: Console, outcome: Outcome) -> None:
     """Verdict and findings for people."""
     console.print(Text.assemble((outcome.recording, "bold"), f": {outcome.verdict}"))
     for f in outcome.findings:
-        together = f" (one of set {f.set_number})" if f.set_number else ""
-        console.print(
-            Text.assemble(
-                "  ", (f.term.effect.name, "bold"),
-                f" {f.term.instrument}{together}: {f.located.region.label}",
-            )
-        )
-        if f.term.effect.name != "stuck_sensor":
-            for size in sizes_of(f, outcome.station, outcome.start):
-                console.print(f"    {size.text}")
-        if f.proof is not None:
-            console.print(f"    on held-out blocks it removes {removed_text(f.proof)}")
+        # When a sensor stood still is what its place says.
+        told = f.term.effect.name != "stuck_sensor"
+        sizes = sizes_of(f, outcome.station, outcome.start) if told else []
+        removed = "" if f.proof is None else removed_text(f.proof)
+        print_finding(console, f, sizes, f.located.region.label, removed)
     if outcome.left_over:
         console.print(f"left over: {outcome.left_over}")
-    for note in outcome.declined:
-        console.print(f"not claimed: {note}")
+    if outcome.declined:
+        count = len(outcome.declined)
+        what = "1 thing was" if count == 1 else f"{count} things were"
+        console.print(f"{what} seen and not claimed: report.html says what, and why")
     if not outcome.calibrated:
         console.print("null not calibrated: give --healthy recordings of the same station")

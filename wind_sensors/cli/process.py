@@ -50,6 +50,8 @@ TABLE_FILE = "windows.csv"
 """In the new recording: its averaging windows, for a spreadsheet."""
 _PLAIN_WIDTH = 120
 """Of the tables where no terminal says its own."""
+_MOST_ROWS = 40
+"""So many windows are shown; the file has all of them."""
 _UNCERTAINTY = "±: standard uncertainty, one sigma (68 %)."
 _SPEED_ABOVE_VECTOR = (
     "v: what veering wind makes the mean speed exceed the vector mean by; no error of the mean "
@@ -204,7 +206,8 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
         table.add_column(heading, justify="right")
     if with_vertical:
         table.add_column("upwards\n[m/s]", justify="right")
-    for window in result.windows:
+    shown = result.windows[:_MOST_ROWS]
+    for window in shown:
         quantities = wind_quantities(window, with_vertical=with_vertical, on_board=on_board)
         found = {q.name: q for q in quantities}
         table.add_row(
@@ -223,10 +226,14 @@ def _report(console: Console, result: ProcessedRecording, further: Sequence[str]
     biases.add_column("window\n[s]")
     for quantity in bias_quantities(result.windows[0], terms):
         biases.add_column(f"{quantity.name}\n[{quantity.unit}]", justify="right")
-    for window in result.windows:
+    for window in shown:
         told = (_told(bias, "+.2f") for bias in bias_quantities(window, terms))
         biases.add_row(_span(window, start), *told)
     console.print(biases)
+    if len(shown) < len(result.windows):
+        console.print(
+            f"the first {len(shown)} of {len(result.windows)} windows; {TABLE_FILE} has all of them"
+        )
     console.print(_UNCERTAINTY)
     if "v" in terms:
         console.print(_SPEED_ABOVE_VECTOR)

@@ -37,12 +37,15 @@ def panel_figure(panels: list[Panel], start: int, width: float) -> Figure:
                 panel.at, panel.before, 2.0 * panel.error, fmt=".-", color="#b96a1c",
                 linewidth=0.8, markersize=4, label="before",
             )
-            axis.plot(panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after")
+            axis.plot(
+                panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after", zorder=3
+            )
             since = f" since {date_text(start)}" if panel.axis == "day" else ""
             axis.set_xlabel(f"{panel.axis}{since}")
             axis.set_ylabel(panel.unit)
             axis.set_title(title_for(width, panel.title), fontsize=10)
-        axes[0].legend(loc="best", fontsize=8)
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower left", ncols=2, fontsize=8)
     return figure
 
 
@@ -131,7 +134,12 @@ def outcome_page(outcome: Outcome) -> str:
         if outcome.calibrated
         else "The null is not calibrated: no healthy recording was given."
     )
-    left = outcome.left_over or "Nothing that matters."
+    left = outcome.left_over or (
+        "Nothing of what was looked for. What the figures still show is the scatter of the wind "
+        "and of the instruments, gusts above all."
+    )
+    headline = _headline(outcome)
+    verdict = "" if headline == VERDICTS[outcome.verdict] else f"{VERDICTS[outcome.verdict]}. "
     detectable = tuple(
         f"{words(name)}: {smallest_text(size)}"
         for name, size in sorted(outcome.smallest_detectable.items())
@@ -139,8 +147,8 @@ def outcome_page(outcome: Outcome) -> str:
     body = [
         f"<header class='verdict {outcome.verdict}'><div class='muted'>"
         f"{escape(outcome.recording)} · wind diagnose</div>"
-        f"<h1>{escape(_headline(outcome))}</h1>"
-        f"<p class='muted'>{escape(VERDICTS[outcome.verdict])}. Reference: "
+        f"<h1>{escape(headline)}</h1>"
+        f"<p class='muted'>{escape(verdict)}Reference: "
         f"{escape(outcome.reference)}. {escape(calibrated)}</p>"
         f"{silent_paragraphs(outcome.silent)}</header>",
         _effects(outcome),

@@ -122,7 +122,7 @@ def diagnose_latent(
         calibrated=False,
         findings=findings,
         unexplained=Unexplained(explained.p, 0.0, (), ""),
-        smallest_detectable=_smallest(bench, after),
+        smallest_detectable=_smallest(felt, bench, after),
         station=corrected(station, to_plant),
         start=recording.start,
         length=(recording.stop - recording.start) * 1e-9,
@@ -261,8 +261,9 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
         )
         share = 100.0 * share_removed(gain, base, np.zeros(base.size))
         lines.append(
-            f"{name.replace('_', ' ')}: the best fit is {values}; on held-out blocks it changes "
-            f"the misfit by {-share:+.1f} % (t = {t_of(gain):.1f}), which is no ground for a "
+            f"{name.replace('_', ' ')}: the best fit is {values}; on held-out blocks it "
+            f"{'lowers' if share > 0.0 else 'raises'} the misfit by {abs(share):.1f} % "
+            f"(t = {t_of(gain):.1f}, {needed_t(bench):.1f} needed), which is no ground for a "
             "correction."
         )
     platform = station.platform
@@ -274,14 +275,17 @@ def _declined(bench: Bench, station: Station, explained: Explained) -> tuple[str
     return tuple(lines)
 
 
-def _smallest(bench: Bench, station: Station) -> dict[str, SmallestSize]:
-    """Sizes of the motion and of the compass that the record would have shown, by effect."""
+def _smallest(felt: Felt, bench: Bench, station: Station) -> dict[str, SmallestSize]:
+    """Sizes of the effects that the record would have shown, by effect and instrument."""
     effects = latent_effects(station)
     change = bench.change(station)
     found = {}
-    for name in ("platform_velocity", "heading_deviation"):
-        term = Term(effects[name], PLATFORM, effects[name].templates[0])
-        found[f"{name}/{PLATFORM}"] = smallest_size(
+    for name, place in (
+        ("platform_velocity", PLATFORM), ("heading_deviation", PLATFORM),
+        ("vane_offset", felt.vane), ("calibration_drift", felt.rotor),
+    ):
+        term = Term(effects[name], place, effects[name].templates[0])
+        found[f"{name}/{place}"] = smallest_size(
             bench, station, term, change(term.planted(station))
         )
     return found
