@@ -116,7 +116,10 @@ def test_nothing_is_named_on_a_boat_as_described(seed: int) -> None:
     assert "Nothing that matters" not in text
     (figure,) = {p.title for p in outcome.panels}
     drawn = panel_figure(list(outcome.panels), outcome.start, 9.0)
-    assert not any(axis.get_legend() for axis in drawn.axes) and drawn.legends, figure
+    assert not any(axis.get_legend() for axis in drawn.axes), figure
+    (legend,) = drawn.legends
+    # Nothing was fitted: there is one curve, not one over the other.
+    assert [text.get_text() for text in legend.get_texts()] == ["before"]
 
 
 def test_a_turned_vane_is_not_told_from_a_compass_where_the_velocity_is_the_earths() -> None:

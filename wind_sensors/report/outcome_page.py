@@ -7,6 +7,7 @@ from functools import partial
 from html import escape
 from math import isfinite
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from wind_sensors.diagnosis.effects.wording import date_text, number_text
@@ -37,9 +38,11 @@ def panel_figure(panels: list[Panel], start: int, width: float) -> Figure:
                 panel.at, panel.before, 2.0 * panel.error, fmt=".-", color="#b96a1c",
                 linewidth=0.8, markersize=4, label="before",
             )
-            axis.plot(
-                panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after", zorder=3
-            )
+            if not np.array_equal(panel.before, panel.after, equal_nan=True):
+                axis.plot(
+                    panel.at, panel.after, ".-", color="#1f6fb2", linewidth=0.8, label="after",
+                    zorder=3,
+                )
             since = f" since {date_text(start)}" if panel.axis == "day" else ""
             axis.set_xlabel(f"{panel.axis}{since}")
             axis.set_ylabel(panel.unit)

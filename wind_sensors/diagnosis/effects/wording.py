@@ -58,7 +58,7 @@ def parameter_text(parameter: Parameter, value: float, station: Station | None =
     """
     if parameter.name == BEARING:
         if station is None:
-            return f"wind from {number_text(value)} deg counter-clockwise from the x axis"
+            return f"wind from {number_text(value % 360.0)} deg counter-clockwise from the x axis"
         return f"wind from {clockwise(value, station):.0f} deg {counted_from(station)}"
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     sense = f", {parameter.sense}" if parameter.sense else ""
