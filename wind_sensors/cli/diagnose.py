@@ -121,6 +121,11 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
     console.print(Text.assemble((diagnosis.recording, "bold"), verdict))
     for silent in diagnosis.silent:
         console.print(Text.assemble(("silent", "bold red"), f" {silent.words}"))
+    if not diagnosis.calibrated:
+        console.print(
+            "null not calibrated: nobody told what is normal for this station, so that only what "
+            "is plain gets a name; give --healthy recordings of it"
+        )
     print_notes(console, diagnosis.comparison.recording.notes)
     if diagnosis.findings:
         for f in diagnosis.findings:
@@ -136,5 +141,3 @@ def _print(console: Console, diagnosis: Diagnosis) -> None:
         )
     if diagnosis.unexplained.description:
         console.print(f"left over: {diagnosis.unexplained.description}")
-    if not diagnosis.calibrated:
-        console.print("null not calibrated: give --healthy recordings of the same station")
