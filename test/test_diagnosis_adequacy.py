@@ -41,9 +41,13 @@ from wind_sensors.diagnosis.verdict import diagnose
 from wind_sensors.errors import UserError
 from wind_sensors.motion import rotations
 from wind_sensors.motion.platform_track import Motion
+from wind_sensors.recordings.station_files import load_station
+from wind_sensors.simulation import Scenario, simulate
 from wind_sensors.simulation.drive import Drive
 from wind_sensors.simulation.response import ResponseState, respond
+from wind_sensors.station.model import Input, Reference
 from wind_sensors.station.signals import Angles, Recording
+from wind_sensors.turbulence.synthesis import isotropic_spec
 
 
 def _with_readings(recording: Recording, shift: np.ndarray) -> Recording:
@@ -183,6 +187,22 @@ def test_a_rotor_that_runs_away_is_refused_at_once() -> None:
     station = STATION.model_copy(update={"instruments": (cup, STATION.instrument("vane"))})
     with pytest.raises(UserError, match="runs away"):
         respond(station, comparison.drive, ResponseState(rotors={"cup": (600.0, 0.0)}))
+
+
+def test_a_rotor_turns_often_between_seldom_samples_of_the_reference() -> None:
+    """A propeller by 200 rad in a second: with a slow reference it does not run away."""
+    reference = Reference(topic=Input(topic="/reference/wind"), separation=0.5)
+    station = load_station("mast_propeller_vane").model_copy(update={"reference": reference})
+    wind = isotropic_spec(10.0, 1e-2, 60.0, seed=5)
+    recording = simulate(station, Scenario(wind, duration=120.0, seed=5))
+    known = recording.reference
+    assert known is not None
+    every = round(known.time.size / 120.0)
+    seldom = replace(known, time=known.time[::every], velocity=known.velocity[::every])
+    comparison = prepare(replace(recording, reference=seldom, truth=None))
+    (rotor,) = (c.name for c in comparison.channels if c.kind == "rotor_rate")
+    simulated = comparison.simulate(station).series[rotor]
+    assert np.mean(simulated) == pytest.approx(np.mean(comparison.measured.series[rotor]), rel=0.02)
 
 
 @pytest.mark.parametrize("instrument", ["vane", "station"])

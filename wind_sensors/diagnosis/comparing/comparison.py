@@ -47,8 +47,8 @@ OF_EDDIES = (POWER, ACTIVITY)
 LOW_END = 0.02
 """Below this frequency [Hz] effects shape the residual's spectrum more than noise does."""
 
-FASTEST = 60.0
-"""A rotor that turns further in one interval of the drive [rad] is not a rotor any more."""
+FASTEST = 1500.0
+"""A rotor that turns faster all the time [rad/s] is not a rotor any more."""
 
 SIMULATIONS = 64
 """So many simulated channels are kept: a station that is tried again is not simulated again."""
@@ -250,11 +250,15 @@ class Comparison(View):
         """The response, if the rotor keeps to what rotors can.
 
         Raises:
-            ValueError: It runs away.
+            UserError: It runs away.
         """
         turned = response.rotors[rotor].psi[-1]
-        if not np.isfinite(turned) or abs(turned) > FASTEST * self.drive.wind.shape[0]:
-            raise ValueError(f"'{rotor}' runs away")
+        if not np.isfinite(turned) or abs(turned) > FASTEST * len(self.drive) * self.drive.dt:
+            raise UserError(
+                f"'{rotor}' runs away in this wind.",
+                self.recording.name,
+                "Is the reference in m/s, and are the rotor's constants those of its certificate?",
+            )
         return response
 
     def simulate(

@@ -30,6 +30,7 @@ from wind_sensors.diagnosis.watch.naming import candidates, limited
 from wind_sensors.diagnosis.watch.normal import Normal
 from wind_sensors.diagnosis.watch.sequential import SequentialTest
 from wind_sensors.diagnosis.watch.settings import WatchSettings
+from wind_sensors.errors import UserError
 from wind_sensors.station.model import Station
 
 FloatArray = npt.NDArray[np.float64]
@@ -111,7 +112,7 @@ class SumsJudge:
         templates = templates_of(comparison, self._station, self._effects)
         try:
             bank = signature_bank(comparison, self._station, templates)
-        except ValueError:
+        except (ValueError, UserError):
             return False
         places = self._registry.places_of(bank.templates)
         size = len(self._registry.templates)

@@ -314,7 +314,7 @@ class Watch:
             return
         try:
             pulses, angles = comparison.signals(self.station)
-        except ValueError:
+        except (ValueError, UserError):
             self._skip("the simulated rotor runs away")
             return
         expected = comparison.observe(pulses, angles)
