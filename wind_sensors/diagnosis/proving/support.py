@@ -160,8 +160,9 @@ def borne_out(findings: tuple[Finding, ...]) -> bool:
 def clearly_borne_out(findings: tuple[Finding, ...]) -> bool:
     """Whether blocks that were not fitted speak for the findings beyond what chance makes of them.
 
-    Of fourteen healthy recordings judged without the others six got a name, of which these blocks
-    bore out 0.06 at the most; eight of nine with a fault got one, of which 0.18 at the least.
+    Of fourteen healthy recordings judged without the others six got a name or were `unknown`, of
+    which these blocks bore out 0.06 at the most; eight of nine with a fault got a name, of which
+    they bore out 0.18 at the least.
     """
     proof = next((f.proof for f in findings if f.proof is not None), None)
     return proof is None or proof.low > LEAST_WITHOUT_HEALTHY
